@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstddef>
+#include <initializer_list>
+#include <utility>
+#include <vector>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+/// What the binding files share: array types and conversions. No algorithms live here.
+namespace mirrorbake::bindings {
+
+namespace nb = nanobind;
+
+/// C-contiguous read-only input on the CPU; nanobind converts what differs.
+using FloatArray = nb::ndarray<const float, nb::c_contig, nb::device::cpu>;
+using FloatMatrix = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using FloatImage = nb::ndarray<const float, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using PointArray = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+/// A NumPy array that owns the vector's memory.
+template <typename T>
+nb::ndarray<nb::numpy, T> to_numpy(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
+  auto* owner = new std::vector<T>(std::move(values));
+  nb::capsule deleter(owner, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return nb::ndarray<nb::numpy, T>(owner->data(), shape.size(), shape.begin(), deleter);
+}
+
+/// The same for a vector of GLM vectors, as an array of shape (n, V::length()).
+template <typename V>
+nb::ndarray<nb::numpy, typename V::value_type> vectors_to_numpy(std::vector<V>&& values) {
+  auto* owner = new std::vector<V>(std::move(values));
+  nb::capsule deleter(owner, [](void* p) noexcept { delete static_cast<std::vector<V>*>(p); });
+  const std::size_t shape[2] = {owner->size(), static_cast<std::size_t>(V::length())};
+  return nb::ndarray<nb::numpy, typename V::value_type>(owner->data(), 2, shape, deleter);
+}
+
+/// Reference view of `values`, kept alive by the Python object `owner`.
+template <typename V>
+nb::ndarray<nb::numpy, const typename V::value_type> vectors_view(const std::vector<V>& values, nb::handle owner) {
+  const std::size_t shape[2] = {values.size(), static_cast<std::size_t>(V::length())};
+  return nb::ndarray<nb::numpy, const typename V::value_type>(values.data(), 2, shape, owner);
+}
+
+template <typename T>
+nb::ndarray<nb::numpy, const T> scalars_view(const std::vector<T>& values, nb::handle owner) {
+  const std::size_t shape[1] = {values.size()};
+  return nb::ndarray<nb::numpy, const T>(values.data(), 1, shape, owner);
+}
+
+}  // namespace mirrorbake::bindings
+
+// A glm::vec3 is any sequence of three numbers in Python and comes back as a tuple.
+namespace nanobind::detail {
+
+template <>
+struct type_caster<glm::vec3> {
+  NB_TYPE_CASTER(glm::vec3, const_name("collections.abc.Sequence[float]"))
+
+  bool from_python(handle source, uint8_t, cleanup_list*) noexcept {
+    try {
+      if (len(source) != 3) return false;
+      for (int i = 0; i < 3; ++i) value[i] = cast<float>(float_(source[i]));
+      return true;
+    } catch (...) {
+      PyErr_Clear();
+      return false;
+    }
+  }
+  static handle from_cpp(glm::vec3 v, rv_policy, cleanup_list*) noexcept {
+    return make_tuple(v.x, v.y, v.z).release();
+  }
+};
+
+}  // namespace nanobind::detail

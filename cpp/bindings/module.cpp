@@ -1,0 +1,14 @@
+#include "bind.hpp"
+
+namespace mirrorbake::bindings {
+
+// One function per module, each in bind_<module>.cpp; they only map names.
+void bind_core(nb::module_& m);
+
+}  // namespace mirrorbake::bindings
+
+NB_MODULE(_core, m) {
+  using namespace mirrorbake::bindings;
+  m.doc() = "Compiled part of mirrorbake. Use it through the package `mirrorbake`.";
+  bind_core(m);
+}

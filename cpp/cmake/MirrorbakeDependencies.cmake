@@ -1,0 +1,86 @@
+# Finds what the enabled parts need, prints one table of what was found, and fails once, at the end,
+# with everything that is missing and the packages that provide it.
+
+set(_mirrorbake_table "")
+set(_mirrorbake_missing "")
+
+# mirrorbake_find(LABEL found-variable version minimum debian-package purpose)
+function(_mirrorbake_report label found version minimum package purpose)
+  if(${found})
+    string(APPEND _mirrorbake_table "  found    ${label} ${version} (${purpose}, needs ${minimum})\n")
+  else()
+    string(APPEND _mirrorbake_table "  MISSING  ${label} (${purpose}, needs ${minimum})\n")
+    list(APPEND _mirrorbake_missing ${package})
+  endif()
+  set(_mirrorbake_table "${_mirrorbake_table}" PARENT_SCOPE)
+  set(_mirrorbake_missing "${_mirrorbake_missing}" PARENT_SCOPE)
+endfunction()
+
+find_package(glm CONFIG QUIET)
+_mirrorbake_report(GLM glm_FOUND "${glm_VERSION}" 0.9.9 libglm-dev "vectors")
+
+find_package(TBB 2020 CONFIG QUIET)
+_mirrorbake_report(oneTBB TBB_FOUND "${TBB_VERSION}" 2020 libtbb-dev "threads")
+
+find_package(Eigen3 3.4 CONFIG QUIET)
+_mirrorbake_report(Eigen Eigen3_FOUND "${Eigen3_VERSION}" 3.4 libeigen3-dev "small dense algebra")
+
+find_package(OpenImageIO CONFIG QUIET)
+if(OpenImageIO_FOUND AND OpenImageIO_VERSION VERSION_LESS 2.4)
+  set(OpenImageIO_FOUND FALSE)
+endif()
+_mirrorbake_report(OpenImageIO OpenImageIO_FOUND "${OpenImageIO_VERSION}" 2.4 libopenimageio-dev "image files")
+
+# Embree 4 first; 3 is what Debian 12 and Ubuntu 22.04 ship. Both configs set EMBREE_VERSION and, for
+# the static case only, imported targets; `mirrorbake_embree` hides the difference.
+find_package(embree 4 CONFIG QUIET)
+if(NOT embree_FOUND)
+  find_package(embree 3.13 CONFIG QUIET)
+endif()
+_mirrorbake_report(Embree embree_FOUND "${EMBREE_VERSION}" "3.13 or 4" libembree-dev "ray tracing")
+if(embree_FOUND)
+  add_library(mirrorbake_embree INTERFACE)
+  if(TARGET embree)
+    target_link_libraries(mirrorbake_embree INTERFACE embree)
+  else()
+    target_include_directories(mirrorbake_embree SYSTEM INTERFACE ${EMBREE_INCLUDE_DIRS})
+    target_link_libraries(mirrorbake_embree INTERFACE ${EMBREE_LIBRARIES})
+  endif()
+  target_compile_definitions(mirrorbake_embree INTERFACE MIRRORBAKE_EMBREE_MAJOR=${EMBREE_VERSION_MAJOR})
+endif()
+
+find_package(tinyobjloader CONFIG QUIET)
+_mirrorbake_report(tinyobjloader tinyobjloader_FOUND "${tinyobjloader_VERSION}" 2.0 libtinyobjloader-dev "OBJ meshes")
+
+find_package(TinyGLTF CONFIG QUIET)
+_mirrorbake_report(tinygltf TinyGLTF_FOUND "${TinyGLTF_VERSION}" 2.6 libtinygltf-dev "glTF meshes")
+
+if(MIRRORBAKE_BUILD_TOOLS)
+  find_package(CLI11 CONFIG QUIET)
+  _mirrorbake_report(CLI11 CLI11_FOUND "${CLI11_VERSION}" 2.1 libcli11-dev "command lines of the tools")
+endif()
+if(MIRRORBAKE_BUILD_TESTS)
+  find_package(GTest CONFIG QUIET)
+  _mirrorbake_report(GoogleTest GTest_FOUND "${GTest_VERSION}" 1.12 "libgtest-dev libgmock-dev" "tests")
+  include(GoogleTest)
+endif()
+if(MIRRORBAKE_BUILD_BENCHMARKS)
+  find_package(benchmark CONFIG QUIET)
+  _mirrorbake_report("Google Benchmark" benchmark_FOUND "${benchmark_VERSION}" 1.7 libbenchmark-dev "benchmarks")
+endif()
+if(MIRRORBAKE_BUILD_PYTHON)
+  find_package(Python 3.11 COMPONENTS Interpreter Development.Module QUIET)
+  if(Python_FOUND)
+    execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
+                    OUTPUT_STRIP_TRAILING_WHITESPACE OUTPUT_VARIABLE nanobind_ROOT ERROR_QUIET)
+    find_package(nanobind CONFIG QUIET)
+  endif()
+  _mirrorbake_report(Python Python_FOUND "${Python_VERSION}" 3.11 python3-dev "bindings")
+  _mirrorbake_report(nanobind nanobind_FOUND "${nanobind_VERSION}" 2.4 "nanobind, from PyPI" "bindings")
+endif()
+
+message(STATUS "mirrorbake dependencies:\n${_mirrorbake_table}")
+if(_mirrorbake_missing)
+  list(JOIN _mirrorbake_missing " " _mirrorbake_missing)
+  message(FATAL_ERROR "mirrorbake: dependencies are missing (table above). On Debian or Ubuntu install: ${_mirrorbake_missing}")
+endif()

@@ -1,0 +1,57 @@
+# mirrorbake_add_module(NAME SOURCES ... [DEPENDS module...] [PRIVATE target...])
+#
+# One static library `mirrorbake::NAME` per folder cpp/src/NAME. DEPENDS names the other modules it may
+# use, and is the only place where the direction of dependencies is decided; PRIVATE names third-party
+# targets that stay behind the module.
+function(mirrorbake_add_module name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;DEPENDS;PRIVATE")
+  set(target mirrorbake_${name})
+  add_library(${target} STATIC ${arg_SOURCES})
+  add_library(mirrorbake::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_include_directories(${target}
+    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/cpp/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+    PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
+  target_link_libraries(${target} PUBLIC glm::glm PRIVATE $<BUILD_INTERFACE:mirrorbake_build_flags>)
+  foreach(module IN LISTS arg_DEPENDS)
+    target_link_libraries(${target} PUBLIC mirrorbake::${module})
+  endforeach()
+  target_link_libraries(${target} PRIVATE ${arg_PRIVATE})
+  set_property(GLOBAL APPEND PROPERTY MIRRORBAKE_MODULES ${target})
+endfunction()
+
+# mirrorbake_add_test(MODULE SOURCES ... [DEPENDS module...]): one GoogleTest executable test_MODULE.
+function(mirrorbake_add_test module)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;DEPENDS;PRIVATE")
+  set(target test_${module})
+  add_executable(${target} ${arg_SOURCES})
+  target_link_libraries(${target} PRIVATE mirrorbake_build_flags mirrorbake::${module} GTest::gtest_main GTest::gmock
+                                          ${arg_PRIVATE})
+  foreach(dependency IN LISTS arg_DEPENDS)
+    target_link_libraries(${target} PRIVATE mirrorbake::${dependency})
+  endforeach()
+  gtest_discover_tests(${target} TEST_PREFIX "${module}." DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600)
+endfunction()
+
+# mirrorbake_add_tool(NAME SOURCES ... DEPENDS module...): one command-line program NAME.
+function(mirrorbake_add_tool name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;DEPENDS;PRIVATE")
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE mirrorbake_build_flags CLI11::CLI11 ${arg_PRIVATE})
+  foreach(module IN LISTS arg_DEPENDS)
+    target_link_libraries(${name} PRIVATE mirrorbake::${module})
+  endforeach()
+  target_compile_definitions(${name} PRIVATE MIRRORBAKE_VERSION="${PROJECT_VERSION}")
+  install(TARGETS ${name} COMPONENT tools)
+endfunction()
+
+# mirrorbake_add_benchmark(NAME SOURCES ... DEPENDS module...): one Google Benchmark program bench_NAME.
+function(mirrorbake_add_benchmark name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;DEPENDS;PRIVATE")
+  add_executable(bench_${name} ${arg_SOURCES})
+  target_link_libraries(bench_${name} PRIVATE mirrorbake_build_flags benchmark::benchmark_main ${arg_PRIVATE})
+  foreach(module IN LISTS arg_DEPENDS)
+    target_link_libraries(bench_${name} PRIVATE mirrorbake::${module})
+  endforeach()
+endfunction()

@@ -1,0 +1,20 @@
+#include "mirrorbake/core/error.hpp"
+
+namespace mirrorbake {
+namespace {
+
+std::string join(std::initializer_list<std::string_view> parts) {
+  std::string text;
+  for (std::string_view part : parts) text += part;
+  return text;
+}
+
+}  // namespace
+
+InvalidArgument::InvalidArgument(std::string_view argument, std::string_view value, std::string_view expected)
+    : Error(join({argument, " is ", value, ", expected ", expected})) {}
+
+FileError::FileError(std::string_view path, std::string_view problem)
+    : Error(join({path, ": ", problem})), path_(path) {}
+
+}  // namespace mirrorbake

@@ -1,0 +1,7 @@
+#include "mirrorbake/core/version.hpp"
+
+namespace mirrorbake {
+
+const char* version() { return MIRRORBAKE_VERSION; }
+
+}  // namespace mirrorbake

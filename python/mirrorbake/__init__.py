@@ -1,0 +1,1 @@
+"""Bakes the reflections of shiny objects into parameterized environment maps."""

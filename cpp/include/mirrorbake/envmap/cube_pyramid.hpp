@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 /// Order of the texels of a cube map with all its mip levels.
 namespace mirrorbake {
@@ -25,5 +27,10 @@ struct CubePyramidLayout {
            static_cast<std::size_t>(column);
   }
 };
+
+/// The whole pyramid (texels × channels) of a cube map (6 × size × size × channels): every level is the mean of the
+/// finer one's 2×2 texels weighted by their solid angles ([EMT] §2.4; spec E3 b), which keeps the mean radiance over
+/// the sphere. Throws InvalidArgument if `faces` has another size.
+std::vector<float> build_cube_pyramid(std::span<const float> faces, const CubePyramidLayout& layout, int channels);
 
 }  // namespace mirrorbake

@@ -1,0 +1,142 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/scene/scene.hpp"
+
+namespace mirrorbake {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+// One triangle with everything a mesh can have, in a scene with everything a scene can have.
+Scene complete_scene() {
+  Scene scene;
+  Image texture(2, 1, {"R", "G", "B"});
+  texture.pixels = {0.0F, 0.5F, 1.0F, 1.0F, 0.5F, 0.0F};
+  scene.textures.push_back(texture);
+  Material material;
+  material.name = "chrome";
+  material.albedo_texture = 0;
+  material.specular = true;
+  material.fresnel = {FresnelModel::conductor, glm::vec3(0.0F), glm::vec3(3.1F), glm::vec3(3.3F)};
+  scene.materials.push_back(material);
+  Object object;
+  object.name = "sail";
+  object.mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  object.mesh.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
+  object.mesh.uvs = {{0, 0}, {1, 0}, {0, 1}};
+  object.mesh.triangles = {{0, 1, 2}, {0, 0, 1}};  // the second one is degenerate, as at the pole of a patch
+  object.mesh.parts = {0, 1};
+  object.part_names = {"cloth", "seam"};
+  scene.objects.push_back(object);
+  scene.rectangle_lights.push_back({});
+  scene.point_lights.push_back({});
+  scene.environment = EnvironmentLight{texture, 1.0F, 0.0F};
+  return scene;
+}
+
+struct Defect {
+  std::string expected;  // part of the message
+  std::function<void(Scene&)> make;
+};
+
+TEST(Scene, ValidationAcceptsACompleteSceneAndAnEmptyOne) {
+  EXPECT_NO_THROW(validate(complete_scene()));
+  EXPECT_NO_THROW(validate(Scene{}));
+}
+
+TEST(Scene, ValidationNamesTheThingAndTheFieldThatIsWrong) {
+  const std::vector<Defect> defects = {
+      {"texture 0 channel count is 1", [](Scene& s) { s.textures[0].channels = {"Y"}; }},
+      {"texture 0 number of values is 5", [](Scene& s) { s.textures[0].pixels.pop_back(); }},
+      {"texture 0 is 0 × 1 pixels", [](Scene& s) { s.textures[0].width = 0; }},
+      {"texture 0 pixel (1, 0) channel 2 is 1.5", [](Scene& s) { s.textures[0].pixels[5] = 1.5F; }},
+      {"texture 0 pixel (0, 0) channel 0 is nan", [](Scene& s) { s.textures[0].pixels[0] = kNan; }},
+      {"material 0 'chrome' albedo is", [](Scene& s) { s.materials[0].albedo.y = 1.01F; }},
+      {"material 0 'chrome' albedo is", [](Scene& s) { s.materials[0].albedo.z = kNan; }},
+      {"material 0 'chrome' albedo_texture is 1", [](Scene& s) { s.materials[0].albedo_texture = 1; }},
+      {"material 0 'chrome' albedo_texture is -2", [](Scene& s) { s.materials[0].albedo_texture = -2; }},
+      {"material 0 'chrome' emission is", [](Scene& s) { s.materials[0].emission.x = -1.0F; }},
+      {"material 0 'chrome' fresnel k is", [](Scene& s) { s.materials[0].fresnel.k.x = -0.1F; }},
+      {"material 0 'chrome' fresnel eta is", [](Scene& s) { s.materials[0].fresnel.eta.x = 0.0F; }},
+      {"material 0 'chrome' fresnel eta is",
+       [](Scene& s) {
+         s.materials[0].fresnel.model = FresnelModel::dielectric;
+         s.materials[0].fresnel.eta.x = kInf;
+       }},
+      {"material 0 'chrome' fresnel r0 is",
+       [](Scene& s) {
+         s.materials[0].fresnel.model = FresnelModel::schlick;
+         s.materials[0].fresnel.r0.x = 1.1F;
+       }},
+      {"object 0 'sail' material is 1", [](Scene& s) { s.objects[0].material = 1; }},
+      {"object 0 'sail' material is -1", [](Scene& s) { s.objects[0].material = -1; }},
+      {"object 0 'sail' vertex 2 is", [](Scene& s) { s.objects[0].mesh.positions[2].y = kNan; }},
+      {"object 0 'sail' vertex 1 is", [](Scene& s) { s.objects[0].mesh.positions[1].y = kInf; }},
+      {"object 0 'sail' vertex 1 is", [](Scene& s) { s.objects[0].mesh.positions[1].y = -1e13F; }},
+      {"object 0 'sail' normal count is 2", [](Scene& s) { s.objects[0].mesh.normals.pop_back(); }},
+      {"object 0 'sail' normal 1 is", [](Scene& s) { s.objects[0].mesh.normals[1] = glm::vec3(0.0F); }},
+      {"object 0 'sail' normal 1 is", [](Scene& s) { s.objects[0].mesh.normals[1].x = kNan; }},
+      {"object 0 'sail' uv count is 2", [](Scene& s) { s.objects[0].mesh.uvs.pop_back(); }},
+      {"object 0 'sail' uv 0 is", [](Scene& s) { s.objects[0].mesh.uvs[0].x = kInf; }},
+      {"object 0 'sail' triangle 0 vertex index is 3",
+       [](Scene& s) { s.objects[0].mesh.triangles[0].y = 3; }},
+      {"object 0 'sail' area is 0", [](Scene& s) { s.objects[0].mesh.triangles[0].y = 0; }},
+      {"object 0 'sail' area is 0", [](Scene& s) { s.objects[0].mesh = {}; }},
+      {"object 0 'sail' part index count is 1", [](Scene& s) { s.objects[0].mesh.parts.pop_back(); }},
+      {"object 0 'sail' part of triangle 1 is 2", [](Scene& s) { s.objects[0].mesh.parts[1] = 2; }},
+      {"object 0 'sail' part of triangle 1 is 1", [](Scene& s) { s.objects[0].part_names.clear(); }},
+      {"rectangle light 0 corner is", [](Scene& s) { s.rectangle_lights[0].corner.x = kNan; }},
+      {"rectangle light 0 edge_u is", [](Scene& s) { s.rectangle_lights[0].edge_u.x = kInf; }},
+      {"rectangle light 0 edge_v is", [](Scene& s) { s.rectangle_lights[0].edge_v.x = kNan; }},
+      {"rectangle light 0 area is 0",
+       [](Scene& s) { s.rectangle_lights[0].edge_v = 2.0F * s.rectangle_lights[0].edge_u; }},
+      {"rectangle light 0 radiance is", [](Scene& s) { s.rectangle_lights[0].radiance.x = -1.0F; }},
+      {"point light 0 position is", [](Scene& s) { s.point_lights[0].position.x = kNan; }},
+      {"point light 0 intensity is", [](Scene& s) { s.point_lights[0].intensity.z = kInf; }},
+      {"environment panorama pixel (0, 0) channel 1 is",
+       [](Scene& s) { s.environment->panorama.pixels[1] = kInf; }},
+      {"environment panorama pixel (0, 0) channel 1 is",
+       [](Scene& s) { s.environment->panorama.pixels[1] = -1; }},
+      {"environment scale is", [](Scene& s) { s.environment->scale = -1.0F; }},
+      {"environment rotation_degrees is", [](Scene& s) { s.environment->rotation_degrees = kNan; }},
+  };
+  for (const Defect& defect : defects) {
+    Scene scene = complete_scene();
+    defect.make(scene);
+    try {
+      validate(scene);
+      ADD_FAILURE() << "accepted: " << defect.expected;
+    } catch (const InvalidArgument& error) {
+      EXPECT_THAT(error.what(), HasSubstr(defect.expected));
+      EXPECT_THAT(error.what(), HasSubstr("expected"));
+    }
+  }
+}
+
+TEST(Scene, ValidationIgnoresTheFresnelParametersOfAMatteMaterial) {
+  Scene scene = complete_scene();
+  scene.materials[0].specular = false;
+  scene.materials[0].fresnel.eta = glm::vec3(-1.0F);
+  EXPECT_NO_THROW(validate(scene));
+}
+
+TEST(Scene, BoundsAreTheExtremesOfTheVertices) {
+  TriangleMesh mesh;
+  mesh.positions = {{1, -2, 3}, {-4, 5, -6}, {0, 0, 9}};
+  const Bounds box = bounds(mesh);
+  EXPECT_EQ(box.min, glm::vec3(-4, -2, -6));
+  EXPECT_EQ(box.max, glm::vec3(1, 5, 9));
+  EXPECT_THROW(bounds(TriangleMesh{}), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace mirrorbake

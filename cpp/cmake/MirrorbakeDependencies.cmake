@@ -76,7 +76,7 @@ if(MIRRORBAKE_BUILD_PYTHON)
     find_package(nanobind CONFIG QUIET)
   endif()
   _mirrorbake_report(Python Python_FOUND "${Python_VERSION}" 3.11 python3-dev "bindings")
-  _mirrorbake_report(nanobind nanobind_FOUND "${nanobind_VERSION}" 2.4 "nanobind, from PyPI" "bindings")
+  _mirrorbake_report(nanobind nanobind_FOUND "${nanobind_VERSION}" 3.1 "nanobind, from PyPI" "bindings")
 endif()
 
 message(STATUS "mirrorbake dependencies:\n${_mirrorbake_table}")

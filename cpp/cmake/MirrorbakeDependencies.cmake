@@ -30,6 +30,12 @@ if(OpenImageIO_FOUND AND OpenImageIO_VERSION VERSION_LESS 2.4)
   set(OpenImageIO_FOUND FALSE)
 endif()
 _mirrorbake_report(OpenImageIO OpenImageIO_FOUND "${OpenImageIO_VERSION}" 2.4 libopenimageio-dev "image files")
+if(OpenImageIO_FOUND)
+  # Debian's package lists the include folder of OpenCV, which its headers do not use and which need not exist.
+  get_target_property(_oiio_includes OpenImageIO::OpenImageIO INTERFACE_INCLUDE_DIRECTORIES)
+  list(FILTER _oiio_includes EXCLUDE REGEX "opencv")
+  set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${_oiio_includes}")
+endif()
 
 # Embree 4 first; 3 is what Debian 12 and Ubuntu 22.04 ship. Both configs set EMBREE_VERSION and, for
 # the static case only, imported targets; `mirrorbake_embree` hides the difference.

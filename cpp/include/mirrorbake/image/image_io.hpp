@@ -1,32 +1,56 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "mirrorbake/image/image.hpp"
 
 /// Image files (EXR, HDR, TIFF, PNG, JPEG) through OpenImageIO, which stays behind this header.
 namespace mirrorbake {
 
-/// Bounds of what a reader accepts: files are hostile until read.
+/// Bounds of what a reader accepts: files are hostile until read. They are checked before pixels are
+/// allocated.
 struct ImageLimits {
-  int max_side = 65536;                                ///< pixels
-  std::uint64_t max_bytes = std::uint64_t{4} << 30;    ///< of the decoded float32 pixels
+  int max_side = 65536;  ///< pixels
+  int max_channels = 1024;
+  std::uint64_t max_bytes = std::uint64_t{4} << 30;  ///< of the decoded float32 pixels
 };
 
 /// Pixel storage in a file. `automatic`: float16 for EXR, 8 bit for PNG and JPEG, float32 otherwise.
 enum class PixelFormat { automatic, half, float32, uint8, uint16 };
 
+/// "automatic", "half", "float32", "uint8" or "uint16". Throws InvalidArgument.
+PixelFormat parse_pixel_format(std::string_view name);
+
 struct SaveReport {
-  std::uint64_t clamped_to_half = 0;  ///< values beyond ±65504 that were clamped because the file stores float16
+  std::uint64_t clamped_to_half =
+      0;                      ///< values beyond ±65504 that were clamped because the file stores float16
+  std::uint64_t clipped = 0;  ///< values outside [0,1], or below 0 in HDR, or NaN there, that were clipped
 };
 
-/// Reads a file as scene-linear float32; integer formats are decoded from sRGB, alpha is left alone. Throws
-/// FileError if it is missing, not an image, truncated or beyond `limits`.
+/// Reads a file as scene-linear float32. What kind of file it is follows from its first bytes, not from its
+/// name. Integer formats are decoded from sRGB unless the file says that it is linear; alpha is left alone,
+/// colour is multiplied by it (premultiplied, as EXR has it). The image is the display window: what a cropped
+/// data window leaves out is 0. Of a file with several images the first is read. Throws FileError if it is
+/// missing, not an image, truncated or beyond `limits`.
 Image load_image(const std::string& path, const ImageLimits& limits = {});
 
 /// Writes atomically: a temporary file beside `path`, renamed when it is complete. The extension decides the
-/// format. Integer formats are encoded to sRGB after clipping to [0,1]. Throws FileError.
-SaveReport save_image(const std::string& path, const Image& image, PixelFormat format = PixelFormat::automatic);
+/// format. EXR and TIFF hold any channels; PNG one to four, of which an even number must end with "A"; JPEG
+/// one or three; HDR three. Integer formats are encoded to sRGB after clipping to [0,1], alpha unassociated.
+/// Throws FileError if the file cannot be written or its kind cannot hold the image, InvalidArgument if the
+/// image is empty or its parts disagree.
+SaveReport save_image(const std::string& path, const Image& image,
+                      PixelFormat format = PixelFormat::automatic);
+
+/// The same for `pixels` of shape height × width × channels.size().
+SaveReport save_image(const std::string& path, int width, int height, std::span<const std::string> channels,
+                      std::span<const float> pixels, PixelFormat format = PixelFormat::automatic);
+
+/// Names of 1 to 4 channels: Y; Y, A; R, G, B; R, G, B, A. Throws InvalidArgument for any other count.
+std::vector<std::string> default_channels(int count);
 
 }  // namespace mirrorbake

@@ -1,0 +1,398 @@
+#include "mirrorbake/image/image_io.hpp"
+
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <new>
+#include <set>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/image/atomic_file.hpp"
+#include "mirrorbake/image/color.hpp"
+
+namespace mirrorbake {
+namespace {
+
+constexpr float kLargestHalf = 65504.0F;
+
+enum class FileKind { exr, hdr, tiff, png, jpeg };
+
+const char* plugin_name(FileKind kind) {
+  switch (kind) {
+    case FileKind::exr:
+      return "openexr";
+    case FileKind::hdr:
+      return "hdr";
+    case FileKind::tiff:
+      return "tiff";
+    case FileKind::png:
+      return "png";
+    case FileKind::jpeg:
+      return "jpeg";
+  }
+  return "";
+}
+
+// Only these five readers ever see a file: OpenImageIO left to itself tries all of its plugins on one it does
+// not recognise.
+FileKind kind_from_content(const std::string& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) throw FileError(path, "does not exist");
+  if (!std::filesystem::is_regular_file(status)) throw FileError(path, "is not a file");
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw FileError(path, "cannot be read");
+  std::array<unsigned char, 8> head{};
+  in.read(reinterpret_cast<char*>(head.data()), head.size());
+  const auto starts_with = [&](std::initializer_list<int> magic) {
+    return std::equal(magic.begin(), magic.end(), head.begin(),
+                      [](int a, unsigned char b) { return a == b; });
+  };
+  if (starts_with({0x76, 0x2f, 0x31, 0x01})) return FileKind::exr;
+  if (starts_with({'#', '?'})) return FileKind::hdr;
+  if (starts_with({'I', 'I', 42, 0}) || starts_with({'I', 'I', 43, 0}) || starts_with({'M', 'M', 0, 42}) ||
+      starts_with({'M', 'M', 0, 43})) {
+    return FileKind::tiff;
+  }
+  if (starts_with({0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a})) return FileKind::png;
+  if (starts_with({0xff, 0xd8, 0xff})) return FileKind::jpeg;
+  throw FileError(path, "is not an EXR, HDR, TIFF, PNG or JPEG image");
+}
+
+FileKind kind_from_extension(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".exr") return FileKind::exr;
+  if (extension == ".hdr") return FileKind::hdr;
+  if (extension == ".tif" || extension == ".tiff") return FileKind::tiff;
+  if (extension == ".png") return FileKind::png;
+  if (extension == ".jpg" || extension == ".jpeg") return FileKind::jpeg;
+  throw FileError(path, "has an unknown extension, expected .exr, .hdr, .tif, .tiff, .png, .jpg or .jpeg");
+}
+
+// A JPEG decoder makes up what a truncated file lacks and carries on. Every complete file ends with an
+// end-of-image marker, possibly followed by a few bytes that programs append.
+bool jpeg_is_complete(const std::string& path) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  const std::streamoff size = in.tellg();
+  const std::streamoff tail_size = std::min<std::streamoff>(size, 4096);
+  std::string tail(static_cast<std::size_t>(tail_size), '\0');
+  in.seekg(size - tail_size);
+  in.read(tail.data(), tail_size);
+  return in && tail.find("\xff\xd9") != std::string::npos;
+}
+
+std::string size_text(std::int64_t width, std::int64_t height, int channels) {
+  return std::to_string(width) + " x " + std::to_string(height) + " pixels of " + std::to_string(channels) +
+         " channels";
+}
+
+void check_limits(const std::string& path, std::int64_t width, std::int64_t height, int channels,
+                  const ImageLimits& limits) {
+  if (width < 1 || height < 1 || channels < 1) {
+    throw FileError(path, "is empty: " + size_text(width, height, channels));
+  }
+  const bool too_wide = width > limits.max_side || height > limits.max_side || channels > limits.max_channels;
+  // Sides and channels are bounded by then, so that the product cannot overflow.
+  if (too_wide || static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
+                          static_cast<std::uint64_t>(channels) * sizeof(float) >
+                      limits.max_bytes) {
+    throw FileError(path, "is too large: " + size_text(width, height, channels) + ", the limits are " +
+                              std::to_string(limits.max_side) + " a side, " +
+                              std::to_string(limits.max_channels) + " channels and " +
+                              std::to_string(limits.max_bytes >> 20) + " MiB");
+  }
+}
+
+bool is_integer(OIIO::TypeDesc format) {
+  return !format.is_floating_point();
+}
+
+bool says_linear(const OIIO::ImageSpec& spec) {
+  const std::string space = spec.get_string_attribute("oiio:ColorSpace");
+  return space == "Linear" || space == "linear" || space == "scene_linear" || space.starts_with("lin_");
+}
+
+// Copies the part of the data window that lies in the display window.
+std::vector<float> display_window(const OIIO::ImageSpec& spec, const std::vector<float>& data) {
+  const std::size_t channels = static_cast<std::size_t>(spec.nchannels);
+  std::vector<float> pixels(static_cast<std::size_t>(spec.full_width) *
+                            static_cast<std::size_t>(spec.full_height) * channels);
+  const std::int64_t left = std::max<std::int64_t>(spec.x, spec.full_x);
+  const std::int64_t right =
+      std::min<std::int64_t>(std::int64_t{spec.x} + spec.width, std::int64_t{spec.full_x} + spec.full_width);
+  const std::int64_t top = std::max<std::int64_t>(spec.y, spec.full_y);
+  const std::int64_t bottom = std::min<std::int64_t>(std::int64_t{spec.y} + spec.height,
+                                                     std::int64_t{spec.full_y} + spec.full_height);
+  for (std::int64_t y = top; y < bottom && left < right; ++y) {
+    const std::size_t from = static_cast<std::size_t>((y - spec.y) * spec.width + left - spec.x) * channels;
+    const std::size_t to =
+        static_cast<std::size_t>((y - spec.full_y) * spec.full_width + left - spec.full_x) * channels;
+    std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(from),
+                static_cast<std::size_t>(right - left) * channels,
+                pixels.begin() + static_cast<std::ptrdiff_t>(to));
+  }
+  return pixels;
+}
+
+void decode_srgb(const OIIO::ImageSpec& spec, std::vector<float>& pixels) {
+  std::array<float, 256> table;
+  for (std::size_t i = 0; i < table.size(); ++i) table[i] = srgb_decode(static_cast<float>(i) / 255.0F);
+  const bool is_byte = spec.format == OIIO::TypeDesc::UINT8;
+  const std::size_t channels = static_cast<std::size_t>(spec.nchannels);
+  const std::size_t alpha = spec.alpha_channel < 0 ? channels : static_cast<std::size_t>(spec.alpha_channel);
+  parallel_for(pixels.size() / channels, 1 << 14, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        float& value = pixels[i * channels + c];
+        if (c == alpha) continue;
+        value = is_byte ? table[static_cast<std::size_t>(value * 255.0F + 0.5F)] : srgb_decode(value);
+      }
+    }
+  });
+}
+
+void multiply_by_alpha(const OIIO::ImageSpec& spec, std::vector<float>& pixels) {
+  const std::size_t channels = static_cast<std::size_t>(spec.nchannels);
+  const std::size_t alpha = static_cast<std::size_t>(spec.alpha_channel);
+  for (std::size_t i = 0; i < pixels.size(); i += channels) {
+    for (std::size_t c = 0; c < channels; ++c) {
+      if (c != alpha) pixels[i + c] *= pixels[i + alpha];
+    }
+  }
+}
+
+Image read(const std::string& path, FileKind kind, const ImageLimits& limits) {
+  const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(plugin_name(kind));
+  if (!input) throw FileError(path, "cannot be read: " + OIIO::geterror());
+  // Unassociated alpha is multiplied in here, in linear light, and not by the reader in encoded values.
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  OIIO::ImageSpec spec;
+  if (!input->open(path, spec, config)) throw FileError(path, "cannot be read: " + input->geterror());
+  if (spec.deep) throw FileError(path, "holds deep samples, expected flat pixels");
+  if (spec.depth > 1) throw FileError(path, "is a volume, expected an image");
+  check_limits(path, spec.width, spec.height, spec.nchannels, limits);
+  if (spec.full_width < 1 || spec.full_height < 1) {
+    spec.full_x = spec.x;
+    spec.full_y = spec.y;
+    spec.full_width = spec.width;
+    spec.full_height = spec.height;
+  }
+  check_limits(path, spec.full_width, spec.full_height, spec.nchannels, limits);
+
+  Image image;
+  image.width = spec.full_width;
+  image.height = spec.full_height;
+  image.channels.assign(spec.channelnames.begin(), spec.channelnames.end());
+  image.pixels.resize(static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) *
+                      static_cast<std::size_t>(spec.nchannels));
+  input->threads(thread_count());
+  // The TIFF reader succeeds on a truncated file and only leaves a message.
+  if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, image.pixels.data()) ||
+      input->has_error()) {
+    throw FileError(path, "is damaged or truncated: " + input->geterror());
+  }
+  if (is_integer(spec.format) && !says_linear(spec)) decode_srgb(spec, image.pixels);
+  if (spec.alpha_channel >= 0 && spec.get_int_attribute("oiio:UnassociatedAlpha") != 0) {
+    multiply_by_alpha(spec, image.pixels);
+  }
+  if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width ||
+      spec.height != spec.full_height) {
+    image.pixels = display_window(spec, image.pixels);
+  }
+  return image;
+}
+
+OIIO::TypeDesc storage_type(const std::string& path, FileKind kind, PixelFormat format) {
+  const auto refuse = [&](const char* expected) {
+    throw FileError(path, std::string("its format cannot store these pixels, expected ") + expected);
+  };
+  using OIIO::TypeDesc;
+  switch (kind) {
+    case FileKind::exr:
+      if (format == PixelFormat::automatic || format == PixelFormat::half) return TypeDesc::HALF;
+      if (format != PixelFormat::float32) refuse("half or float32");
+      return TypeDesc::FLOAT;
+    case FileKind::hdr:
+      if (format != PixelFormat::automatic && format != PixelFormat::float32)
+        refuse("float32 (stored as RGBE)");
+      return TypeDesc::FLOAT;
+    case FileKind::png:
+      if (format == PixelFormat::uint16) return TypeDesc::UINT16;
+      if (format != PixelFormat::automatic && format != PixelFormat::uint8) refuse("uint8 or uint16");
+      return TypeDesc::UINT8;
+    case FileKind::jpeg:
+      if (format != PixelFormat::automatic && format != PixelFormat::uint8) refuse("uint8");
+      return TypeDesc::UINT8;
+    case FileKind::tiff:
+      if (format == PixelFormat::half) return TypeDesc::HALF;
+      if (format == PixelFormat::uint8) return TypeDesc::UINT8;
+      if (format == PixelFormat::uint16) return TypeDesc::UINT16;
+      return TypeDesc::FLOAT;
+  }
+  return TypeDesc::UNKNOWN;
+}
+
+void check_channels(const std::string& path, FileKind kind, std::span<const std::string> channels) {
+  const std::size_t count = channels.size();
+  const bool ends_with_alpha = channels.back() == "A";
+  const bool holds = kind == FileKind::png    ? count <= 4 && (count % 2 == 0) == ends_with_alpha
+                     : kind == FileKind::jpeg ? count == 1 || (count == 3 && !ends_with_alpha)
+                     : kind == FileKind::hdr  ? count == 3 && !ends_with_alpha
+                                              : true;
+  if (holds) return;
+  throw FileError(path, std::string("a ") +
+                            (kind == FileKind::png    ? "PNG holds Y; Y, A; R, G, B or R, G, B, A"
+                             : kind == FileKind::jpeg ? "JPEG holds Y or R, G, B"
+                                                      : "HDR file holds R, G, B") +
+                            ", the image has " + std::to_string(count) + " channels, the last named " +
+                            channels.back());
+}
+
+// Turns `values`, whole pixels, into what `spec` stores.
+void encode(const OIIO::ImageSpec& spec, FileKind kind, std::span<float> values, SaveReport& report) {
+  if (spec.format == OIIO::TypeDesc::HALF) {
+    for (float& v : values) {
+      if (std::abs(v) > kLargestHalf) {
+        v = std::copysign(kLargestHalf, v);
+        ++report.clamped_to_half;
+      }
+    }
+    return;
+  }
+  if (kind == FileKind::hdr) {
+    // RGBE has no sign, and its largest exponent is 2^127.
+    for (float& v : values) {
+      if (!(v >= 0.0F) || v > 0x1.fep126F) {
+        v = v > 0.0F ? 0x1.fep126F : 0.0F;
+        ++report.clipped;
+      }
+    }
+    return;
+  }
+  if (!is_integer(spec.format)) return;
+  const std::size_t channels = static_cast<std::size_t>(spec.nchannels);
+  const std::size_t alpha = spec.alpha_channel < 0 ? channels : static_cast<std::size_t>(spec.alpha_channel);
+  for (std::size_t i = 0; i < values.size(); i += channels) {
+    if (alpha < channels) {
+      const float a = values[i + alpha];
+      for (std::size_t c = 0; c < channels; ++c) {
+        if (c != alpha && a != 0.0F) values[i + c] /= a;
+      }
+    }
+    for (std::size_t c = 0; c < channels; ++c) {
+      float& v = values[i + c];
+      if (!(v >= 0.0F && v <= 1.0F)) ++report.clipped;
+      v = c == alpha ? (v > 0.0F ? std::min(v, 1.0F) : 0.0F) : srgb_encode(v);
+    }
+  }
+}
+
+}  // namespace
+
+PixelFormat parse_pixel_format(std::string_view name) {
+  if (name == "automatic") return PixelFormat::automatic;
+  if (name == "half") return PixelFormat::half;
+  if (name == "float32") return PixelFormat::float32;
+  if (name == "uint8") return PixelFormat::uint8;
+  if (name == "uint16") return PixelFormat::uint16;
+  throw InvalidArgument("format", name, "automatic, half, float32, uint8 or uint16");
+}
+
+std::vector<std::string> default_channels(int count) {
+  switch (count) {
+    case 1:
+      return {"Y"};
+    case 2:
+      return {"Y", "A"};
+    case 3:
+      return {"R", "G", "B"};
+    case 4:
+      return {"R", "G", "B", "A"};
+    default:
+      throw InvalidArgument("channels", std::to_string(count), "1 to 4, or the names of the channels");
+  }
+}
+
+Image load_image(const std::string& path, const ImageLimits& limits) {
+  const FileKind kind = kind_from_content(path);
+  if (kind == FileKind::jpeg && !jpeg_is_complete(path)) throw FileError(path, "is truncated");
+  try {
+    return read(path, kind, limits);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw FileError(path, "does not fit into memory");
+  } catch (const std::exception& e) {
+    throw FileError(path, std::string("is damaged: ") + e.what());
+  }
+}
+
+SaveReport save_image(const std::string& path, const Image& image, PixelFormat format) {
+  return save_image(path, image.width, image.height, image.channels, image.pixels, format);
+}
+
+SaveReport save_image(const std::string& path, int width, int height, std::span<const std::string> channels,
+                      std::span<const float> pixels, PixelFormat format) {
+  if (width < 1 || height < 1 || channels.empty()) {
+    throw InvalidArgument("image", size_text(width, height, static_cast<int>(channels.size())),
+                          "at least one pixel");
+  }
+  const std::size_t row_values = static_cast<std::size_t>(width) * channels.size();
+  if (pixels.size() != row_values * static_cast<std::size_t>(height)) {
+    throw InvalidArgument("image.pixels", std::to_string(pixels.size()) + " values",
+                          size_text(width, height, static_cast<int>(channels.size())));
+  }
+  if (std::set<std::string>(channels.begin(), channels.end()).size() != channels.size()) {
+    throw InvalidArgument("image.channels", "a list with a name twice", "different names");
+  }
+  const FileKind kind = kind_from_extension(path);
+  check_channels(path, kind, channels);
+
+  OIIO::ImageSpec spec(width, height, static_cast<int>(channels.size()), storage_type(path, kind, format));
+  spec.channelnames.assign(channels.begin(), channels.end());
+  const auto alpha = std::find(channels.begin(), channels.end(), "A");
+  spec.alpha_channel = alpha == channels.end() ? -1 : static_cast<int>(alpha - channels.begin());
+  if (is_integer(spec.format)) {
+    spec.attribute("oiio:ColorSpace", "sRGB");
+    if (spec.alpha_channel >= 0) spec.attribute("oiio:UnassociatedAlpha", 1);
+  } else {
+    spec.attribute("oiio:ColorSpace", "Linear");
+  }
+  if (kind == FileKind::exr || kind == FileKind::tiff) spec.attribute("compression", "zip");
+  spec.attribute("Software", "mirrorbake");
+
+  AtomicFile file(path);
+  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin_name(kind));
+  if (!output) throw FileError(path, "cannot be written: " + OIIO::geterror());
+  output->threads(thread_count());
+  if (!output->open(file.temporary(), spec))
+    throw FileError(path, "cannot be written: " + output->geterror());
+  SaveReport report;
+  constexpr int kRows = 64;
+  std::vector<float> rows;
+  for (int y = 0; y < height; y += kRows) {
+    const int end = std::min(height, y + kRows);
+    const auto first = pixels.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(y) * row_values);
+    rows.assign(first, first + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(end - y) * row_values));
+    encode(spec, kind, rows, report);
+    if (!output->write_scanlines(y, end, 0, OIIO::TypeDesc::FLOAT, rows.data())) {
+      throw FileError(path, "cannot be written: " + output->geterror());
+    }
+  }
+  if (!output->close()) throw FileError(path, "cannot be written: " + output->geterror());
+  file.commit();
+  return report;
+}
+
+}  // namespace mirrorbake

@@ -1,0 +1,144 @@
+"""The shape of the source tree: who may include whom, and how large a file may grow."""
+
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CPP = ROOT / "cpp"
+
+# What each C++ module may use directly, in the order in which the modules build on each other.
+ALLOWED: dict[str, set[str]] = {}
+ALLOWED["core"] = set()
+ALLOWED["projection"] = {"core"}
+ALLOWED["proxy"] = {"core"}
+ALLOWED["image"] = {"core"}
+ALLOWED["shading"] = {"core"}
+ALLOWED["envmap"] = {"core", "projection", "proxy", "image"}
+ALLOWED["prefilter"] = ALLOWED["envmap"] | {"envmap"}
+ALLOWED["scene"] = {"core", "image", "shading"}
+ALLOWED["tracer"] = ALLOWED["scene"] | {"scene"}
+ALLOWED["inference"] = set(ALLOWED)
+ALLOWED["pem"] = set(ALLOWED)
+
+# Each library is the business of the modules named here, and of their implementation only.
+OWNERS = {
+    "embree": ("tracer",),
+    "OpenImageIO": ("image",),
+    "tbb": ("core",),
+    "tiny_gltf": ("scene",),
+    "tiny_obj_loader": ("scene",),
+}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+MAX_LINES = 600
+
+
+def tracked_files() -> list[Path]:
+    """Every file that git tracks or would track."""
+    listing = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return [ROOT / line for line in listing.stdout.splitlines() if (ROOT / line).is_file()]
+
+
+def text_files() -> Iterator[tuple[Path, str]]:
+    for path in tracked_files():
+        try:
+            yield path, path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue
+
+
+def module_sources() -> Iterator[tuple[str, Path, list[str]]]:
+    """Module, path and includes of every file of the library."""
+    for area in (CPP / "include" / "mirrorbake", CPP / "src"):
+        for path in sorted(area.rglob("*.[ch]pp")):
+            yield path.relative_to(area).parts[0], path, INCLUDE.findall(path.read_text(encoding="utf-8"))
+
+
+def test_every_module_has_its_place_in_the_order() -> None:
+    modules = {module for module, _, _ in module_sources()}
+    assert {"core", "projection", "envmap", "tracer"} <= modules
+    assert modules <= set(ALLOWED)
+
+
+def test_includes_follow_the_direction_of_dependencies() -> None:
+    violations = [
+        f"{path.relative_to(ROOT)} includes {include}"
+        for module, path, includes in module_sources()
+        for include in includes
+        if include.startswith("mirrorbake/") and include.split("/")[1] not in ALLOWED[module] | {module}
+    ]
+    assert not violations
+
+
+def test_link_lines_follow_the_direction_of_dependencies() -> None:
+    declared = {}
+    for path in (CPP / "src").glob("*/CMakeLists.txt"):
+        call = re.search(
+            r"mirrorbake_add_module\((\w+)\s(.*?)\)", path.read_text(encoding="utf-8"), re.DOTALL
+        )
+        assert call, path
+        depends = re.search(r"DEPENDS\s+([a-z\s]+)", call[2])
+        declared[call[1]] = set(depends[1].split()) if depends else set()
+    assert declared["projection"] == {"core"}
+    violations = [
+        f"{module} links {other}"
+        for module, others in declared.items()
+        for other in others
+        if other not in ALLOWED[module]
+    ]
+    assert not violations
+
+
+@pytest.mark.parametrize("library", OWNERS)
+def test_third_party_library_stays_behind_its_module(library: str) -> None:
+    headers = CPP / "include"
+    violations = [
+        str(path.relative_to(ROOT))
+        for module, path, includes in module_sources()
+        for include in includes
+        if include.startswith(library) and (path.is_relative_to(headers) or module not in OWNERS[library])
+    ]
+    assert not violations
+
+
+def test_public_headers_are_guarded_and_include_public_headers_by_full_name() -> None:
+    for _, path, includes in module_sources():
+        if not path.is_relative_to(CPP / "include"):
+            continue
+        assert path.read_text(encoding="utf-8").startswith("#pragma once\n"), path
+        for include in includes:
+            if include.endswith(".hpp") and not include.startswith("glm/"):
+                assert (CPP / "include" / include).is_file(), f"{path} includes {include}"
+
+
+def test_no_source_file_is_too_long_to_read() -> None:
+    suffixes = {".cpp", ".hpp", ".py", ".cmake", ".txt", ".toml", ".ts", ".js", ".html", ".css"}
+    too_long = {
+        str(path.relative_to(ROOT)): lines
+        for path, text in text_files()
+        if path.suffix in suffixes and (lines := text.count("\n")) > MAX_LINES
+    }
+    assert not too_long
+
+
+def test_files_hold_no_unfinished_work_and_no_private_paths() -> None:
+    # Written in pieces, so that this file passes its own test.
+    words = re.compile(r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b|^#if 0$", re.MULTILINE)
+    private = re.compile(r"(?<![\w.$}])/(?:home|root|work|Users)/")
+    hits = [
+        f"{path.relative_to(ROOT)}: {match[0]}"
+        for path, text in text_files()
+        for match in (words.search(text), private.search(text))
+        if match
+    ]
+    assert not hits

@@ -1,10 +1,12 @@
 # Finds what the enabled parts need, prints one table of what was found, and fails once, at the end,
 # with everything that is missing and the packages that provide it.
 
+# A project that adds mirrorbake as a subdirectory links these through our targets.
+set(CMAKE_FIND_PACKAGE_TARGETS_GLOBAL ON)
+
 set(_mirrorbake_table "")
 set(_mirrorbake_missing "")
 
-# mirrorbake_find(LABEL found-variable version minimum debian-package purpose)
 function(_mirrorbake_report label found version minimum package purpose)
   if(${found})
     string(APPEND _mirrorbake_table "  found    ${label} ${version} (${purpose}, needs ${minimum})\n")
@@ -25,7 +27,10 @@ _mirrorbake_report(oneTBB TBB_FOUND "${TBB_VERSION}" 2020 libtbb-dev "threads")
 find_package(Eigen3 3.4 CONFIG QUIET)
 _mirrorbake_report(Eigen Eigen3_FOUND "${Eigen3_VERSION}" 3.4 libeigen3-dev "small dense algebra")
 
+# Debian's Imath, which OpenImageIO pulls in, reports its missing Python parts in spite of QUIET.
+set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
 find_package(OpenImageIO CONFIG QUIET)
+unset(CMAKE_MESSAGE_LOG_LEVEL)
 if(OpenImageIO_FOUND AND OpenImageIO_VERSION VERSION_LESS 2.4)
   set(OpenImageIO_FOUND FALSE)
 endif()
@@ -37,23 +42,8 @@ if(OpenImageIO_FOUND)
   set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${_oiio_includes}")
 endif()
 
-# Embree 4 first; 3 is what Debian 12 and Ubuntu 22.04 ship. Both configs set EMBREE_VERSION and, for
-# the static case only, imported targets; `mirrorbake_embree` hides the difference.
-find_package(embree 4 CONFIG QUIET)
-if(NOT embree_FOUND)
-  find_package(embree 3.13 CONFIG QUIET)
-endif()
+include(MirrorbakeEmbree)
 _mirrorbake_report(Embree embree_FOUND "${EMBREE_VERSION}" "3.13 or 4" libembree-dev "ray tracing")
-if(embree_FOUND)
-  add_library(mirrorbake_embree INTERFACE)
-  if(TARGET embree)
-    target_link_libraries(mirrorbake_embree INTERFACE embree)
-  else()
-    target_include_directories(mirrorbake_embree SYSTEM INTERFACE ${EMBREE_INCLUDE_DIRS})
-    target_link_libraries(mirrorbake_embree INTERFACE ${EMBREE_LIBRARIES})
-  endif()
-  target_compile_definitions(mirrorbake_embree INTERFACE MIRRORBAKE_EMBREE_MAJOR=${EMBREE_VERSION_MAJOR})
-endif()
 
 find_package(tinyobjloader CONFIG QUIET)
 _mirrorbake_report(tinyobjloader tinyobjloader_FOUND "${tinyobjloader_VERSION}" 2.0 libtinyobjloader-dev "OBJ meshes")

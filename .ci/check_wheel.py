@@ -1,0 +1,43 @@
+"""Checks that a wheel holds the package and nothing else, and that it works as it lies.
+
+Usage: python .ci/check_wheel.py FILE.whl
+"""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import zipfile
+from pathlib import Path
+
+
+def main(wheel: Path) -> None:
+    with tempfile.TemporaryDirectory() as target:
+        with zipfile.ZipFile(wheel) as archive:
+            names = archive.namelist()
+            archive.extractall(target)
+        foreign = [name for name in names if not name.startswith(("mirrorbake/", "mirrorbake-"))]
+        development = [name for name in names if name.endswith((".a", ".hpp", ".cmake", ".cpp"))]
+        if foreign or development:
+            sys.exit(f"{wheel}: should hold the Python package alone, holds {foreign + development}")
+        for needed in ("mirrorbake/py.typed", "mirrorbake/_core.pyi"):
+            if needed not in names:
+                sys.exit(f"{wheel}: lacks {needed}")
+        # -S keeps the editable installation of this environment out of the way; the dependencies still come from it.
+        path = os.pathsep.join((target, sysconfig.get_path("purelib"), sysconfig.get_path("platlib")))
+        code = "import mirrorbake, mirrorbake._core as c; print(mirrorbake.__file__, c.__file__, c.version())"
+        output = subprocess.run(
+            [sys.executable, "-S", "-c", code],
+            env={**os.environ, "PYTHONPATH": path},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout.split()
+        if not all(file.startswith(target) for file in output[:2]):
+            sys.exit(f"{wheel}: imported {output[:2]} instead of the wheel's files")
+        print(f"{wheel.name}: {len(names)} files, version {output[2]}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

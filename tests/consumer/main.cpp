@@ -1,0 +1,38 @@
+// Uses several modules through their installed headers and checks one known answer of each.
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "mirrorbake/core/version.hpp"
+#include "mirrorbake/envmap/cube_pyramid.hpp"
+#include "mirrorbake/envmap/cube_sampling.hpp"
+#include "mirrorbake/shading/fresnel.hpp"
+
+int main() {
+  int failures = 0;
+  const auto expect = [&failures](const char* what, double value, double expected, double tolerance) {
+    const bool good = std::abs(value - expected) <= tolerance;
+    std::printf("%-44s %.9g\n", what, value);
+    if (!good) {
+      std::fprintf(stderr, "%s: %.9g instead of %.9g\n", what, value, expected);
+      ++failures;
+    }
+  };
+
+  // Glass at normal incidence: ((n − 1) / (n + 1))².
+  expect("reflectance of glass", mirrorbake::fresnel_dielectric(1.0F, 1.5F), 0.04, 1e-6);
+
+  // A uniform environment looks the same in every direction and on every level.
+  const auto layout = mirrorbake::CubePyramidLayout::full(8);
+  const std::vector<float> faces(6 * 8 * 8, 3.0F);
+  const std::vector<float> pyramid = mirrorbake::build_cube_pyramid(faces, layout, 1);
+  const auto footprint = mirrorbake::trilinear_footprint(layout, glm::vec3(0.3F, -2.0F, 1.0F), 1.25F);
+  double radiance = 0.0;
+  for (int i = 0; i < footprint.count; ++i) radiance += footprint.texels[i].weight * pyramid[footprint.texels[i].texel];
+  expect("radiance of a uniform environment", radiance, 3.0, 1e-5);
+
+  std::printf("mirrorbake %s\n", mirrorbake::version());
+  return failures;
+}

@@ -24,7 +24,7 @@ def main(wheel: Path) -> None:
         for needed in ("mirrorbake/py.typed", "mirrorbake/_core.pyi"):
             if needed not in names:
                 sys.exit(f"{wheel}: lacks {needed}")
-        # -S keeps the editable installation of this environment out of the way; the dependencies still come from it.
+        # -S keeps this environment's editable installation away; the dependencies still come from it.
         path = os.pathsep.join((target, sysconfig.get_path("purelib"), sysconfig.get_path("platlib")))
         code = "import mirrorbake, mirrorbake._core as c; print(mirrorbake.__file__, c.__file__, c.version())"
         output = subprocess.run(

@@ -30,7 +30,8 @@ int main() {
   const std::vector<float> pyramid = mirrorbake::build_cube_pyramid(faces, layout, 1);
   const auto footprint = mirrorbake::trilinear_footprint(layout, glm::vec3(0.3F, -2.0F, 1.0F), 1.25F);
   double radiance = 0.0;
-  for (int i = 0; i < footprint.count; ++i) radiance += footprint.texels[i].weight * pyramid[footprint.texels[i].texel];
+  for (int i = 0; i < footprint.count; ++i)
+    radiance += footprint.texels[i].weight * pyramid[footprint.texels[i].texel];
   expect("radiance of a uniform environment", radiance, 3.0, 1e-5);
 
   std::printf("mirrorbake %s\n", mirrorbake::version());

@@ -36,16 +36,16 @@ void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t, std::size_t)>& body) {
   grain = std::max<std::size_t>(grain, 1);
   const std::size_t chunks = (count + grain - 1) / grain;
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-    body(chunk * grain, std::min(count, (chunk + 1) * grain));
-  });
+  tbb::parallel_for(std::size_t{0}, chunks,
+                    [&](std::size_t chunk) { body(chunk * grain, std::min(count, (chunk + 1) * grain)); });
 }
 
 double parallel_sum(std::size_t count, std::size_t grain,
                     const std::function<double(std::size_t, std::size_t)>& body) {
   grain = std::max<std::size_t>(grain, 1);
   std::vector<double> partial((count + grain - 1) / grain);
-  parallel_for(count, grain, [&](std::size_t begin, std::size_t end) { partial[begin / grain] = body(begin, end); });
+  parallel_for(count, grain,
+               [&](std::size_t begin, std::size_t end) { partial[begin / grain] = body(begin, end); });
   double sum = 0;
   for (double part : partial) sum += part;
   return sum;

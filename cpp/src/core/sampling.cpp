@@ -41,7 +41,8 @@ glm::vec2 sobol_2d(std::uint32_t index, std::uint64_t sequence) {
   const std::uint64_t more_seeds = hash64(seeds);
   const std::uint32_t shuffled = owen_scramble(index, static_cast<std::uint32_t>(seeds));
   const std::uint32_t x = owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(seeds >> 32));
-  const std::uint32_t y = owen_scramble(sobol_second_dimension(shuffled), static_cast<std::uint32_t>(more_seeds));
+  const std::uint32_t y =
+      owen_scramble(sobol_second_dimension(shuffled), static_cast<std::uint32_t>(more_seeds));
   return {unit_float(x), unit_float(y)};
 }
 

@@ -39,7 +39,8 @@ TEST(Parallel, ThreadLimitRejectsNonsense) {
 }
 
 TEST(Parallel, ForRethrows) {
-  EXPECT_THROW(parallel_for(10, 1, [](std::size_t, std::size_t) { throw NumericalError("no"); }), NumericalError);
+  EXPECT_THROW(parallel_for(10, 1, [](std::size_t, std::size_t) { throw NumericalError("no"); }),
+               NumericalError);
 }
 
 }  // namespace

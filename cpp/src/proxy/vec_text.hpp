@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cmath>
+#include <cstdio>
+#include <glm/vec3.hpp>
+#include <string>
+
+namespace mirrorbake::detail {
+
+inline bool is_finite(glm::vec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// "(1, 2, 3)", for error messages.
+inline std::string vec_text(glm::vec3 v) {
+  char text[96];
+  std::snprintf(text, sizeof text, "(%g, %g, %g)", static_cast<double>(v.x), static_cast<double>(v.y),
+                static_cast<double>(v.z));
+  return text;
+}
+
+}  // namespace mirrorbake::detail

@@ -1,12 +1,15 @@
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
 #include <cmath>
+#include <cstdint>
+#include <glm/matrix.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <variant>
 #include <vector>
-
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/variant.h>
 
 #include "bind.hpp"
 #include "mirrorbake/core/error.hpp"
@@ -19,7 +22,8 @@ namespace {
 using Axes = nb::ndarray<const float, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 using TriangleArray = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
-/// Rows of the array are the proxy's axes in world space, which makes it proxy_from_world; GLM stores columns.
+/// Rows of the array are the proxy's axes in world space, which makes it proxy_from_world; GLM stores
+/// columns.
 glm::mat3 axes_matrix(const std::optional<Axes>& axes) {
   glm::mat3 matrix(1.0F);
   if (axes) {
@@ -44,19 +48,244 @@ const char* kind_name(const Proxy& proxy) {
   return kNames[proxy.shape.index()];
 }
 
-/// Calls `get` on the shape, if it has what `get` reads; AttributeError otherwise.
-template <typename Get>
-auto shape_field(const Proxy& proxy, const char* field, Get get) {
+/// `get` of the shape, if it is one that `get` accepts; AttributeError otherwise, so that hasattr() tells.
+template <typename Field, typename Get>
+Field shape_field(const Proxy& proxy, const char* field, Get get) {
   return std::visit(
-      [&](const auto& shape) -> std::decay_t<decltype(get(Box{}, Ellipsoid{}))> {
-        if constexpr (requires { get(shape, shape); }) {
-          return get(shape, shape);
+      [&](const auto& shape) -> Field {
+        if constexpr (std::is_invocable_v<Get, decltype(shape)>) {
+          return get(shape);
         } else {
-          throw nb::attribute_error((std::string("a proxy of kind '") + kind_name(proxy) + "' has no " + field).c_str());
+          const std::string text = std::string("a proxy of kind '") + kind_name(proxy) + "' has no " + field;
+          throw nb::attribute_error(text.c_str());
         }
       },
       proxy.shape);
 }
 
+template <typename Real>
+using RayArray = nb::ndarray<const Real, nb::c_contig, nb::device::cpu>;
+
+template <typename Real>
+void check_rays(const RayArray<Real>& positions, const RayArray<Real>& directions) {
+  const auto shape_text = [](const RayArray<Real>& array) {
+    std::string text = "(";
+    for (std::size_t i = 0; i < array.ndim(); ++i)
+      text += (i > 0 ? ", " : "") + std::to_string(array.shape(i));
+    return text + ")";
+  };
+  const auto check = [&](const char* name, const RayArray<Real>& array) {
+    if (array.ndim() == 0 || array.shape(array.ndim() - 1) != 3) {
+      throw InvalidArgument(name, "of shape " + shape_text(array), "shape (..., 3)");
+    }
+    for (std::size_t i = 0; i < array.size(); ++i) {
+      if (!std::isfinite(array.data()[i])) {
+        throw InvalidArgument(name, std::to_string(array.data()[i]) + " in row " + std::to_string(i / 3),
+                              "finite");
+      }
+    }
+  };
+  check("positions", positions);
+  check("directions", directions);
+  bool same = positions.ndim() == directions.ndim();
+  for (std::size_t i = 0; same && i < positions.ndim(); ++i) same = positions.shape(i) == directions.shape(i);
+  if (!same)
+    throw InvalidArgument("directions", "of shape " + shape_text(directions), "the shape of positions");
+}
+
+template <typename Real>
+nb::ndarray<nb::numpy, Real> lookup(const Proxy& proxy, const RayArray<Real>& positions,
+                                    const RayArray<Real>& directions) {
+  using Vector = glm::vec<3, Real>;
+  check_rays(positions, directions);
+  const std::size_t count = positions.size() / 3;
+  std::vector<Real> lookups(positions.size());
+  {
+    nb::gil_scoped_release release;
+    lookup_directions(proxy, std::span(reinterpret_cast<const Vector*>(positions.data()), count),
+                      std::span(reinterpret_cast<const Vector*>(directions.data()), count),
+                      std::span(reinterpret_cast<Vector*>(lookups.data()), count));
+  }
+  auto* owner = new std::vector<Real>(std::move(lookups));
+  nb::capsule deleter(owner, [](void* p) noexcept { delete static_cast<std::vector<Real>*>(p); });
+  std::vector<std::size_t> shape;
+  for (std::size_t i = 0; i < positions.ndim(); ++i) shape.push_back(positions.shape(i));
+  return nb::ndarray<nb::numpy, Real>(owner->data(), shape.size(), shape.data(), deleter);
+}
+
+std::span<const glm::vec3> points(const PointArray& array) {
+  return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
+}
+
 }  // namespace
+
+void bind_proxy(nb::module_& m) {
+  nb::class_<Proxy> proxy(
+      m, "Proxy", R"(The shape on which an environment map lies ([PEM] section 4), with the map's origin.
+
+Made by the static constructors. Immutable. Positions and extents are world space, in metres; `axes` is a (3, 3)
+array whose rows are the shape's own axes in world space (default: aligned with the world's).)");
+  proxy
+      .def_static(
+          "infinite", [](glm::vec3 origin) { return make_proxy(InfiniteSphere{}, origin); },
+          nb::arg("origin") = glm::vec3(0.0F), "The classic environment map: only the direction counts.")
+      .def_static(
+          "box",
+          [](glm::vec3 centre, glm::vec3 half_extent, std::optional<glm::vec3> origin,
+             std::optional<Axes> axes) {
+            return make_proxy(Box{centre, half_extent, axes_matrix(axes)}, origin.value_or(centre));
+          },
+          nb::arg("centre"), nb::arg("half_extent"), nb::arg("origin") = nb::none(),
+          nb::arg("axes") = nb::none(),
+          "A box. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for unusable "
+          "values.")
+      .def_static(
+          "ellipsoid",
+          [](glm::vec3 centre, glm::vec3 radii, std::optional<glm::vec3> origin, std::optional<Axes> axes) {
+            return make_proxy(Ellipsoid{centre, radii, axes_matrix(axes)}, origin.value_or(centre));
+          },
+          nb::arg("centre"), nb::arg("radii"), nb::arg("origin") = nb::none(), nb::arg("axes") = nb::none(),
+          "An ellipsoid. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for "
+          "unusable "
+          "values.")
+      .def_static(
+          "sphere",
+          [](glm::vec3 centre, float radius, std::optional<glm::vec3> origin) {
+            return make_proxy(Ellipsoid{centre, glm::vec3(radius)}, origin.value_or(centre));
+          },
+          nb::arg("centre"), nb::arg("radius"), nb::arg("origin") = nb::none(),
+          "A finite sphere: an ellipsoid with three equal radii.")
+      .def_static(
+          "hemisphere",
+          [](glm::vec3 centre, float radius, glm::vec3 origin, std::optional<Axes> axes) {
+            return make_proxy(Hemisphere{centre, radius, axes_matrix(axes)}, origin);
+          },
+          nb::arg("centre"), nb::arg("radius"), nb::arg("origin"), nb::arg("axes") = nb::none(),
+          "The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie inside, "
+          "above the "
+          "floor.")
+      .def_prop_ro("kind", &kind_name, "'infinite', 'box', 'ellipsoid' or 'hemisphere'.")
+      .def_ro("origin", &Proxy::origin, "Origin of the map: lookups are directions seen from here.")
+      .def_prop_ro(
+          "centre",
+          [](const Proxy& p) {
+            return shape_field<glm::vec3>(
+                p, "centre", [](const auto& s) -> std::decay_t<decltype(s.centre)> { return s.centre; });
+          },
+          "Centre of the shape (of its floor, for the hemisphere). AttributeError if it is infinite.")
+      .def_prop_ro(
+          "half_extent",
+          [](const Proxy& p) {
+            return shape_field<glm::vec3>(
+                p, "half_extent",
+                [](const auto& s) -> std::decay_t<decltype(s.half_extent)> { return s.half_extent; });
+          },
+          "Half the box's edge lengths, along its axes. AttributeError for other kinds.")
+      .def_prop_ro(
+          "radii",
+          [](const Proxy& p) {
+            return shape_field<glm::vec3>(
+                p, "radii", [](const auto& s) -> std::decay_t<decltype(s.radii)> { return s.radii; });
+          },
+          "Radii of the ellipsoid along its axes. AttributeError for other kinds.")
+      .def_prop_ro(
+          "radius",
+          [](const Proxy& p) {
+            return shape_field<float>(
+                p, "radius", [](const auto& s) -> std::decay_t<decltype(s.radius)> { return s.radius; });
+          },
+          "Radius of the hemisphere. AttributeError for other kinds.")
+      .def_prop_ro(
+          "axes",
+          [](const Proxy& p) {
+            const glm::mat3 columns = shape_field<glm::mat3>(
+                p, "axes", [](const auto& s) -> std::decay_t<decltype(s.proxy_from_world)> {
+                  return s.proxy_from_world;
+                });
+            const glm::mat3 rows = glm::transpose(columns);
+            return to_numpy(std::vector<float>(&rows[0][0], &rows[0][0] + 9), {3, 3});
+          },
+          nb::rv_policy::move,
+          "The shape's own axes in world space, one per row. AttributeError if it is infinite.")
+      .def("lookup", &lookup<double>, nb::arg("positions").noconvert(), nb::arg("directions").noconvert())
+      .def("lookup", &lookup<float>, nb::arg("positions"), nb::arg("directions"),
+           R"(Directions in which the map is read by rays.
+
+From the map's origin to where each ray leaves the shape, not normalised; `directions` itself for the infinite shape.
+Positions outside and rays that miss get a continuous answer, never NaN.
+
+Parameters
+----------
+positions, directions
+    (..., 3), of one shape, finite, world space; directions of any length > 0. The arithmetic is float64 in any case;
+    two float64 arrays give a float64 result, anything else float32.
+
+Returns
+-------
+    Array of the same shape.
+
+Raises
+------
+InvalidArgument
+    Shapes that differ or do not end in 3, NaN or infinite values (the row is named).)")
+      .def("validate", &validate, "Raises InvalidArgument, naming the field, if the proxy is not usable.")
+      .def("__repr__", [](const Proxy& p) {
+        const nb::object self = nb::cast(p);
+        std::string text = std::string("Proxy(kind='") + kind_name(p) + "'";
+        for (const char* field : {"centre", "half_extent", "radii", "radius", "origin"}) {
+          if (nb::hasattr(self, field)) {
+            text += std::string(", ") + field + "=" + nb::cast<std::string>(nb::repr(self.attr(field)));
+          }
+        }
+        return text + ")";
+      });
+
+  m.def(
+      "area_weighted_centroid",
+      [](PointArray positions, TriangleArray triangles) {
+        const std::span indices(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0));
+        nb::gil_scoped_release release;
+        return area_weighted_centroid(points(positions), indices);
+      },
+      nb::arg("positions"), nb::arg("triangles"),
+      "Area-weighted mean of the triangles' centroids: the origin of an object's maps ([PEM] section 4).\n\n"
+      "`positions` (n, 3) in metres, `triangles` (m, 3) indices. Returns (x, y, z). Raises InvalidArgument "
+      "for indices "
+      "out of range and for meshes without area.");
+  m.def(
+      "fit_ellipsoid",
+      [](PointArray array, glm::vec3 centre, std::optional<glm::vec3> origin) {
+        nb::gil_scoped_release release;
+        return make_proxy(fit_ellipsoid(points(array), centre), origin.value_or(centre));
+      },
+      nb::arg("points"), nb::arg("centre"), nb::arg("origin") = nb::none(),
+      "Minimum-volume axis-aligned ellipsoid around `centre` that encloses every point, to a relative volume "
+      "of 1e-6.\n\n"
+      "`points` (n, 3). `origin` of the returned Proxy defaults to `centre`. Flat input gets radii of at "
+      "least 1e-4 of "
+      "the largest extent. Raises InvalidArgument if all points lie at the centre.");
+  m.def(
+      "fit_box_mean_distance",
+      [](PointArray hits, glm::vec3 origin, float floor) {
+        nb::gil_scoped_release release;
+        return make_proxy(fit_box_mean_distance(points(hits), origin, floor), origin);
+      },
+      nb::arg("hits"), nb::arg("origin"), nb::arg("floor"),
+      "Box by [PEM] section 4: bottom on the plane y = `floor`, the other sides at the mean distance of the "
+      "hits on "
+      "that side.\n\n`hits` (n, 3): where rays from around the object meet the surroundings. Returns a Proxy "
+      "with the "
+      "given origin.");
+  m.def(
+      "fit_box_robust",
+      [](PointArray hits, glm::vec3 origin) {
+        nb::gil_scoped_release release;
+        return make_proxy(fit_box_robust(points(hits), origin), origin);
+      },
+      nb::arg("hits"), nb::arg("origin"),
+      "Axis-aligned box around `origin` that fits the hits best, by robust (Huber) least squares of their "
+      "distances to "
+      "its surface.\n\n`hits` (n, 3). Returns a Proxy with the given origin.");
+}
+
 }  // namespace mirrorbake::bindings

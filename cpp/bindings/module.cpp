@@ -4,6 +4,7 @@ namespace mirrorbake::bindings {
 
 // One function per module, each in bind_<module>.cpp; they only map names.
 void bind_core(nb::module_& m);
+void bind_proxy(nb::module_& m);
 void bind_image(nb::module_& m);
 
 }  // namespace mirrorbake::bindings
@@ -12,5 +13,6 @@ NB_MODULE(_core, m) {
   using namespace mirrorbake::bindings;
   m.doc() = "Compiled part of mirrorbake. Use it through the package `mirrorbake`.";
   bind_core(m);
+  bind_proxy(m);
   bind_image(m);
 }

@@ -211,10 +211,10 @@ TEST(Lookup, IsExactForRaysThatPassThroughFromOutside) {
   }
 }
 
-// Bisects a path towards its largest change: where the answer is continuous the change vanishes with the interval, at a
-// jump it stays. Paths lead from inside to outside and keep the direction or turn it. An interval of 2⁻⁴⁸ of
-// the path leaves 2⁻²⁴ at the square-root kinks of curved shapes (where rays start to miss), and room for the slopes
-// of shapes of aspect 1e4.
+// Bisects a path towards its largest change: where the answer is continuous the change vanishes with the
+// interval, at a jump it stays. Paths lead from inside to outside and keep the direction or turn it. An
+// interval of 2⁻⁴⁸ of the path leaves 2⁻²⁴ at the square-root kinks of curved shapes (where rays start to
+// miss), and room for the slopes of shapes of aspect 1e4.
 TEST(Lookup, ChangesContinuouslyAlongRandomPathsAcrossTheWall) {
   std::mt19937 random(4);
   int crossings = 0;
@@ -223,7 +223,8 @@ TEST(Lookup, ChangesContinuouslyAlongRandomPathsAcrossTheWall) {
       const glm::dvec3 start(point_at(c.gauge, 0.6L, random));
       const glm::dvec3 end(point_at(c.gauge, 1.6L, random));
       const glm::dvec3 d0(glm::normalize(random_direction(random)));
-      const glm::dvec3 d1 = path % 2 == 0 ? d0 : glm::normalize(d0 + 0.4 * glm::dvec3(random_direction(random)));
+      const glm::dvec3 d1 =
+          path % 2 == 0 ? d0 : glm::normalize(d0 + 0.4 * glm::dvec3(random_direction(random)));
       if (c.gauge(start) < 1 && c.gauge(end) > 1) ++crossings;
       const auto lookup_at = [&](double s) {
         return Long3(lookup_direction(c.proxy, start + s * (end - start), d0 + s * (d1 - d0)));

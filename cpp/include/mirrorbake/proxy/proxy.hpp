@@ -75,6 +75,10 @@ glm::dvec3 lookup_direction(const Proxy& proxy, glm::dvec3 position, glm::dvec3 
 void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
                        std::span<const glm::vec3> directions, std::span<glm::vec3> lookups);
 
+/// The same with float64 coordinates.
+void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions,
+                       std::span<const glm::dvec3> directions, std::span<glm::dvec3> lookups);
+
 /// Throws InvalidArgument, naming the field, if the proxy is not usable: extents not positive or not finite,
 /// axes not orthonormal (to 1e-4), origin not inside of the shape.
 void validate(const Proxy& proxy);

@@ -1,7 +1,7 @@
 """Proxy geometry: the shape on which an environment map lies (spec section 4, [PEM] section 4).
 
-A lookup follows a reflected ray from the surface to where it leaves the shape, and reads the map in the direction of
-that point as seen from the map's origin:
+A lookup follows a reflected ray from the surface to where it leaves the shape, and reads the map in the
+direction of that point as seen from the map's origin:
 
 >>> import numpy as np
 >>> from mirrorbake.proxy import Proxy

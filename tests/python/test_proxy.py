@@ -91,7 +91,7 @@ def test_hemisphere_has_a_floor_and_a_dome():
 
 def test_bad_input_is_named():
     proxy = Proxy.sphere((0, 0, 0), 1)
-    with pytest.raises(ValueError, match="directions .* shape"):
+    with pytest.raises(ValueError, match=r"directions .* shape"):
         proxy.lookup(np.zeros((2, 3)), np.zeros((3, 3)))
     with pytest.raises(ValueError, match=r"positions .*shape \(2, 2\)"):
         proxy.lookup(np.zeros((2, 2)), np.zeros((2, 2)))
@@ -113,7 +113,7 @@ def test_area_weighted_centroid_weighs_by_area():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_fit_ellipsoid_is_the_optimum_of_an_independent_convex_solver(seed):
-    """At most 1e-6 in relative volume above SLSQP's optimum of the same convex problem, every vertex inside."""
+    """At most 1e-6 of volume above SLSQP's optimum of the same convex problem, every vertex inside."""
     rng = np.random.default_rng(seed)
     scale = np.array([1.0, 10.0 ** rng.uniform(-2, 2), 0.3])
     points = (rng.standard_normal((400, 3)) * scale).astype(np.float32)

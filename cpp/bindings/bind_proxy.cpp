@@ -3,13 +3,13 @@
 
 #include <cmath>
 #include <cstdint>
-#include <glm/matrix.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
 #include <variant>
 #include <vector>
+#include <glm/matrix.hpp>
 
 #include "bind.hpp"
 #include "mirrorbake/core/error.hpp"
@@ -207,7 +207,6 @@ array whose rows are the shape's own axes in world space (default: aligned with 
           },
           nb::rv_policy::move,
           "The shape's own axes in world space, one per row. AttributeError if it is infinite.")
-      .def("lookup", &lookup<double>, nb::arg("positions").noconvert(), nb::arg("directions").noconvert())
       .def("lookup", &lookup<float>, nb::arg("positions"), nb::arg("directions"),
            R"(Directions in which the map is read by rays.
 
@@ -217,17 +216,18 @@ Positions outside and rays that miss get a continuous answer, never NaN.
 Parameters
 ----------
 positions, directions
-    (..., 3), of one shape, finite, world space; directions of any length > 0. The arithmetic is float64 in any case;
-    two float64 arrays give a float64 result, anything else float32.
+    (..., 3), of one shape, finite, world space; directions of any length > 0.
 
 Returns
 -------
-    Array of the same shape.
+    Array of the same shape. Computed in float64 and rounded.
 
 Raises
 ------
 InvalidArgument
     Shapes that differ or do not end in 3, NaN or infinite values (the row is named).)")
+      .def("lookup_float64", &lookup<double>, nb::arg("positions"), nb::arg("directions"),
+           "lookup() with float64 coordinates and results.")
       .def("validate", &validate, "Raises InvalidArgument, naming the field, if the proxy is not usable.")
       .def("__repr__", [](const Proxy& p) {
         const nb::object self = nb::cast(p);

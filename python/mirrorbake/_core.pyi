@@ -1,7 +1,7 @@
 """Compiled part of mirrorbake. Use it through the package `mirrorbake`."""
 
 from collections.abc import Sequence
-from typing import Annotated, overload
+from typing import Annotated
 
 import numpy
 from numpy.typing import NDArray
@@ -97,10 +97,6 @@ class Proxy:
         The shape's own axes in world space, one per row. AttributeError if it is infinite.
         """
 
-    @overload
-    def lookup(self, positions: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float64]: ...
-
-    @overload
     def lookup(self, positions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """
         Directions in which the map is read by rays.
@@ -111,18 +107,20 @@ class Proxy:
         Parameters
         ----------
         positions, directions
-            (..., 3), of one shape, finite, world space; directions of any length > 0. The arithmetic is float64 in any case;
-            two float64 arrays give a float64 result, anything else float32.
+            (..., 3), of one shape, finite, world space; directions of any length > 0.
 
         Returns
         -------
-            Array of the same shape.
+            Array of the same shape. Computed in float64 and rounded.
 
         Raises
         ------
         InvalidArgument
             Shapes that differ or do not end in 3, NaN or infinite values (the row is named).
         """
+
+    def lookup_float64(self, positions: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float64]:
+        """lookup() with float64 coordinates and results."""
 
     def validate(self) -> None:
         """Raises InvalidArgument, naming the field, if the proxy is not usable."""

@@ -1,7 +1,10 @@
 """Proxy geometry from Python: shapes, lookups against NumPy in float64, fits against SciPy's solver."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
 from mirrorbake.proxy import (
@@ -12,20 +15,19 @@ from mirrorbake.proxy import (
     fit_ellipsoid,
 )
 
-ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # exact decimals, orthonormal
+# Orthonormal in exact decimals.
+ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]], np.float32)
 
 
-def angles(a, b):
+def angles(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     """Angle between rows, well conditioned for small ones."""
     a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+    sine: NDArray[np.float64] = np.linalg.norm(np.cross(a, b), axis=-1)
+    angle: NDArray[np.float64] = np.arctan2(sine, np.sum(a * b, axis=-1))
+    return angle
 
 
-def inside_points(rng, n, extent):
-    return rng.uniform(-0.5, 0.5, (n, 3)) * extent
-
-
-def test_fields_and_kinds():
+def test_fields_and_kinds() -> None:
     box = Proxy.box((1, 2, 3), (4, 5, 6), origin=(1, 2, 4), axes=ROTATION)
     assert box.kind == "box"
     assert box.centre == (1, 2, 3)
@@ -47,77 +49,78 @@ def test_fields_and_kinds():
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_lookups_equal_numpy_in_float64(dtype):
+def test_lookups_equal_numpy_in_float64(dtype: type) -> None:
     rng = np.random.default_rng(1)
-    extent, centre, origin = (
-        np.array([1.0, 2.0, 0.5]),
-        np.array([3.0, -1.0, 0.25]),
-        np.array([3.25, -1.0, 0.25]),
-    )
-    local = inside_points(rng, 500, extent)
-    d = rng.normal(size=(500, 3)).astype(dtype)
-    p = (centre + local @ ROTATION).astype(dtype)
+    extent, centre, origin = (1.0, 2.0, 0.5), (3.0, -1.0, 0.25), (3.25, -1.0, 0.25)
+    local = rng.uniform(-0.5, 0.5, (500, 3)) * extent
+    d: NDArray[Any] = rng.normal(size=(500, 3)).astype(dtype)
+    p: NDArray[Any] = (centre + local @ ROTATION).astype(dtype)
     p64, d64 = p.astype(np.float64), d.astype(np.float64)
-    rotation = ROTATION.astype(np.float32).astype(np.float64)
+    rotation = ROTATION.astype(np.float64)
     q, e = (p64 - centre) @ rotation.T, d64 @ rotation.T
-    t_box = np.min((np.sign(e) * extent - q) / e, axis=1)
-    a, b, c = [np.sum(x, 1) for x in ((e / extent) ** 2, e * q / extent**2, (q / extent) ** 2)]
+    t_box = np.min((np.sign(e) * np.array(extent) - q) / e, axis=1)
+    a, b, c = [np.sum(x, 1) for x in ((e / extent) ** 2, e * q / np.square(extent), (q / extent) ** 2)]
     t_ellipsoid = (-b + np.sqrt(b * b - a * (c - 1))) / a
     for proxy, t in [
         (Proxy.box(centre, extent, origin, ROTATION), t_box),
         (Proxy.ellipsoid(centre, extent, origin, ROTATION), t_ellipsoid),
     ]:
-        lookup = proxy.lookup(p, d)
+        lookup: NDArray[np.float32] | NDArray[np.float64]
+        lookup = proxy.lookup(p, d) if dtype == np.float32 else proxy.lookup_float64(p, d)
         assert lookup.dtype == dtype
         expected = p64 + t[:, None] * d64 - origin
         # Half an ulp per component after rounding to float32; the conditioning of the roots in float64.
         assert angles(lookup, expected).max() < (2e-7 if dtype == np.float32 else 1e-13)
 
 
-def test_lookup_keeps_the_shape_of_its_input():
+def test_lookup_keeps_the_shape_of_its_input() -> None:
     proxy = Proxy.sphere((0, 0, 0), 1)
     d = np.random.default_rng(2).normal(size=(4, 5, 3)).astype(np.float32)
     lookup = proxy.lookup(np.zeros_like(d), d)
     assert lookup.shape == (4, 5, 3)
     np.testing.assert_allclose(lookup, d / np.linalg.norm(d, axis=-1, keepdims=True), rtol=1e-6)
-    assert proxy.lookup(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0, 3)
+    assert proxy.lookup(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)).shape == (0, 3)
 
 
-def test_hemisphere_has_a_floor_and_a_dome():
+def test_hemisphere_has_a_floor_and_a_dome() -> None:
     dome = Proxy.hemisphere((0, 0, 0), 2, (0, 1, 0))
-    lookups = dome.lookup(np.full((3, 3), (0.0, 1, 0)), np.array([[0.0, 1, 0], [0, -1, 0], [1, -1, 0]]))
+    lookups = dome.lookup(
+        np.array([[0, 1, 0]] * 3, np.float32), np.array([[0, 1, 0], [0, -1, 0], [1, -1, 0]], np.float32)
+    )
     np.testing.assert_array_equal(lookups, [[0, 1, 0], [0, -1, 0], [1, -1, 0]])
 
 
-def test_bad_input_is_named():
+def test_bad_input_is_named() -> None:
     proxy = Proxy.sphere((0, 0, 0), 1)
+    zeros = np.zeros((2, 3), np.float32)
     with pytest.raises(ValueError, match=r"directions .* shape"):
-        proxy.lookup(np.zeros((2, 3)), np.zeros((3, 3)))
+        proxy.lookup(zeros, np.zeros((3, 3), np.float32))
     with pytest.raises(ValueError, match=r"positions .*shape \(2, 2\)"):
-        proxy.lookup(np.zeros((2, 2)), np.zeros((2, 2)))
+        proxy.lookup(zeros[:, :2], zeros[:, :2])
     with pytest.raises(ValueError, match="directions is nan in row 1"):
-        proxy.lookup(np.zeros((2, 3)), np.array([[0, 0, 1], [0, np.nan, 1]]))
+        proxy.lookup(zeros, np.array([[0, 0, 1], [0, np.nan, 1]], np.float32))
     with pytest.raises(ValueError, match="half_extent"):
         Proxy.box((0, 0, 0), (1, -1, 1))
     with pytest.raises(ValueError, match="origin"):
         Proxy.ellipsoid((0, 0, 0), (1, 1, 1), origin=(1, 1, 1))
     with pytest.raises(ValueError, match="orthonormal"):
-        Proxy.box((0, 0, 0), (1, 1, 1), axes=2 * np.eye(3))
+        Proxy.box((0, 0, 0), (1, 1, 1), axes=2 * np.eye(3, dtype=np.float32))
 
 
-def test_area_weighted_centroid_weighs_by_area():
-    positions = np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0], [10, 0, 0], [13, 0, 0], [10, 6, 0]])
-    centroid = area_weighted_centroid(positions, np.array([[0, 1, 2], [3, 4, 5]]))
+def test_area_weighted_centroid_weighs_by_area() -> None:
+    corners = [[0, 0, 0], [3, 0, 0], [0, 3, 0], [10, 0, 0], [13, 0, 0], [10, 6, 0]]
+    positions = np.array(corners, np.float32)
+    centroid = area_weighted_centroid(positions, np.array([[0, 1, 2], [3, 4, 5]], np.uint32))
     np.testing.assert_allclose(centroid, [(1 * 1 + 2 * 11) / 3, (1 * 1 + 2 * 2) / 3, 0], rtol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_fit_ellipsoid_is_the_optimum_of_an_independent_convex_solver(seed):
+def test_fit_ellipsoid_is_the_optimum_of_an_independent_convex_solver(seed: int) -> None:
     """At most 1e-6 of volume above SLSQP's optimum of the same convex problem, every vertex inside."""
     rng = np.random.default_rng(seed)
     scale = np.array([1.0, 10.0 ** rng.uniform(-2, 2), 0.3])
     points = (rng.standard_normal((400, 3)) * scale).astype(np.float32)
-    centre = (0.1 * scale).astype(np.float32)
+    centre = tuple((0.1 * scale).astype(np.float32).tolist())
     radii = np.array(fit_ellipsoid(points, centre).radii, np.float64)
 
     squares = (points.astype(np.float64) - centre) ** 2
@@ -140,11 +143,12 @@ def test_fit_ellipsoid_is_the_optimum_of_an_independent_convex_solver(seed):
     assert np.prod(radii) >= independent * (1 - 1e-5)
 
 
-def test_fit_boxes_find_the_room():
+def test_fit_boxes_find_the_room() -> None:
     rng = np.random.default_rng(3)
     room = Proxy.box((0.5, 1.0, -0.5), (3, 1.5, 2), origin=(0, 0.2, 0))
-    d = rng.normal(size=(3000, 3))
-    hits = room.lookup(np.broadcast_to(room.origin, d.shape), d) + room.origin
+    d = rng.normal(size=(3000, 3)).astype(np.float32)
+    start = np.zeros_like(d) + np.array(room.origin, np.float32)
+    hits = room.lookup(start, d) + start
     robust = fit_box_robust(hits, room.origin)
     np.testing.assert_allclose(robust.centre, room.centre, atol=1e-3)
     np.testing.assert_allclose(robust.half_extent, room.half_extent, atol=1e-3)

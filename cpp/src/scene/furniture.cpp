@@ -20,13 +20,9 @@ constexpr float kCell = 0.2F;      // metres between vertices on furniture
 constexpr float kWoodTile = 0.6F;  // metres per repeat of the wood textures
 constexpr float kClothTile = 0.3F;
 
-TriangleMesh wooden(glm::vec3 min, glm::vec3 max) {
-  return make_block(min, max, kCell, kWoodTile);
-}
+TriangleMesh wooden(glm::vec3 min, glm::vec3 max) { return make_block(min, max, kCell, kWoodTile); }
 
-void add_block(TriangleMesh& mesh, glm::vec3 min, glm::vec3 max) {
-  append(mesh, wooden(min, max));
-}
+void add_block(TriangleMesh& mesh, glm::vec3 min, glm::vec3 max) { append(mesh, wooden(min, max)); }
 
 float random(std::uint64_t index, std::uint64_t seed) {
   return unit_float(static_cast<std::uint32_t>(hash64(index, seed) >> 32));

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <glm/vec3.hpp>
 #include <string>
+#include <glm/vec3.hpp>
 
 #include "mirrorbake/scene/scene.hpp"
 

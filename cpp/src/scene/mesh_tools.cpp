@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numbers>
 
 namespace mirrorbake {
 namespace {

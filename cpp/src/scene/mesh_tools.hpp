@@ -1,8 +1,8 @@
 #pragma once
 
+#include <vector>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <vector>
 
 #include "mirrorbake/scene/scene.hpp"
 

@@ -1,8 +1,8 @@
 #include "mirrorbake/scene/room.hpp"
 
-#include <glm/geometric.hpp>
 #include <string>
 #include <utility>
+#include <glm/geometric.hpp>
 
 #include "furniture.hpp"
 #include "mesh_tools.hpp"

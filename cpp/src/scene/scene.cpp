@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <string>
 #include <string_view>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 
@@ -17,33 +17,19 @@ constexpr float kMaxCoordinate = 1e12F;
 // How far from 1 the length of a vertex normal may be: normals stored as 8-bit integers pass.
 constexpr float kNormalTolerance = 1e-2F;
 
-std::string text(float v) {
-  return std::to_string(v);
-}
-std::string text(glm::vec3 v) {
-  return "(" + text(v.x) + ", " + text(v.y) + ", " + text(v.z) + ")";
-}
+std::string text(float v) { return std::to_string(v); }
+std::string text(glm::vec3 v) { return "(" + text(v.x) + ", " + text(v.y) + ", " + text(v.z) + ")"; }
 
-bool is_finite(float v) {
-  return std::isfinite(v);
-}
-bool is_finite(glm::vec2 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y);
-}
-bool is_finite(glm::vec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
+bool is_finite(float v) { return std::isfinite(v); }
+bool is_finite(glm::vec2 v) { return std::isfinite(v.x) && std::isfinite(v.y); }
+bool is_finite(glm::vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 // A comparison with NaN is false, so each of these rejects it.
 bool in_unit_interval(glm::vec3 v) {
   return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x <= 1 && v.y <= 1 && v.z <= 1;
 }
-bool is_finite_positive(glm::vec3 v) {
-  return is_finite(v) && v.x > 0 && v.y > 0 && v.z > 0;
-}
-bool is_finite_nonnegative(glm::vec3 v) {
-  return is_finite(v) && v.x >= 0 && v.y >= 0 && v.z >= 0;
-}
+bool is_finite_positive(glm::vec3 v) { return is_finite(v) && v.x > 0 && v.y > 0 && v.z > 0; }
+bool is_finite_nonnegative(glm::vec3 v) { return is_finite(v) && v.x >= 0 && v.y >= 0 && v.z >= 0; }
 
 std::string label(std::string_view kind, std::size_t index, std::string_view name) {
   std::string result = std::string(kind) + " " + std::to_string(index);

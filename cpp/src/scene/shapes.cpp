@@ -2,9 +2,9 @@
 
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <numbers>
 #include <string>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 
@@ -37,9 +37,7 @@ glm::vec3 around_y(int step, int steps) {
   return {static_cast<float>(std::cos(angle)), 0.0F, static_cast<float>(-std::sin(angle))};
 }
 
-float fraction(int i, int n) {
-  return static_cast<float>(i) / static_cast<float>(n);
-}
+float fraction(int i, int n) { return static_cast<float>(i) / static_cast<float>(n); }
 
 void add_vertex(TriangleMesh& mesh, glm::vec3 position, glm::vec3 normal, glm::vec2 uv) {
   mesh.positions.push_back(position);

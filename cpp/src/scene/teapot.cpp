@@ -1,7 +1,7 @@
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <string>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/scene/shapes.hpp"
@@ -24,9 +24,7 @@ constexpr double kChartInset = 1.0 / 32.0;
 // Bernstein polynomials of degree 3 at t = i/n, with s = 1 − t, and their first derivatives. Both are written
 // so that exchanging t and s reverses them bit for bit: patches that run along a shared edge in opposite
 // directions get identical vertices.
-Weights bernstein(double s, double t) {
-  return {s * s * s, 3.0 * (s * t) * s, 3.0 * (s * t) * t, t * t * t};
-}
+Weights bernstein(double s, double t) { return {s * s * s, 3.0 * (s * t) * s, 3.0 * (s * t) * t, t * t * t}; }
 Weights bernstein_derivative(double s, double t) {
   return {-3.0 * (s * s), 3.0 * (s * (s - 2.0 * t)), 3.0 * (t * (2.0 * s - t)), 3.0 * (t * t)};
 }
@@ -74,9 +72,7 @@ glm::vec2 chart_uv(std::size_t patch, double u, double v) {
 
 }  // namespace
 
-std::vector<std::string> teapot_part_names() {
-  return {"body", "lid"};
-}
+std::vector<std::string> teapot_part_names() { return {"body", "lid"}; }
 
 TriangleMesh make_teapot(int subdivisions, float height) {
   if (subdivisions < 1 || subdivisions > kMaxSubdivisions) {

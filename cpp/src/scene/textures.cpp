@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numbers>
 
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/sampling.hpp"
@@ -50,9 +50,7 @@ float random(int x, int y, std::uint64_t seed) {
   return unit_float(static_cast<std::uint32_t>(hash64(cell, seed) >> 32));
 }
 
-int wrap(int i, int period) {
-  return ((i % period) + period) % period;
-}
+int wrap(int i, int period) { return ((i % period) + period) % period; }
 
 // Value noise in [0,1] on a lattice of periods_u × periods_v cells over the unit square; it repeats.
 float noise(float u, float v, int periods_u, int periods_v, std::uint64_t seed) {
@@ -76,9 +74,7 @@ float grain(float u, float v, std::uint64_t seed) {
          0.2F * noise(u, w, 8, 160, seed + 3);
 }
 
-float square(float x) {
-  return x * x;
-}
+float square(float x) { return x * x; }
 
 }  // namespace
 

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <array>
-#include <glm/geometric.hpp>
 #include <map>
 #include <tuple>
 #include <utility>
 #include <vector>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/scene/scene.hpp"
 

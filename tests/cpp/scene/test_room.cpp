@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <glm/geometric.hpp>
 #include <set>
+#include <glm/geometric.hpp>
 
 #include "mesh_checks.hpp"
 #include "mirrorbake/scene/room.hpp"

@@ -2,9 +2,9 @@
 
 #include <cmath>
 #include <functional>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
+#include <glm/geometric.hpp>
 
 #include "mesh_checks.hpp"
 #include "mirrorbake/core/error.hpp"

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <map>
 #include <numeric>
 #include <set>
 #include <tuple>
 #include <vector>
+#include <glm/geometric.hpp>
 
 #include "mesh_checks.hpp"
 #include "mirrorbake/scene/shapes.hpp"

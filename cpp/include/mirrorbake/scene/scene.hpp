@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
 #include "mirrorbake/image/image.hpp"
 #include "mirrorbake/shading/fresnel.hpp"

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <glm/vec3.hpp>
 #include <string>
 #include <vector>
+#include <glm/vec3.hpp>
 
 #include "mirrorbake/scene/scene.hpp"
 

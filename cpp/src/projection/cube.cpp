@@ -4,6 +4,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "finite_direction.hpp"
+
 namespace mirrorbake {
 namespace {
 
@@ -13,8 +15,9 @@ struct FaceFrame {
   glm::vec3 major, s_axis, t_axis;
 };
 constexpr FaceFrame kFaces[6] = {
-    {{1, 0, 0}, {0, 0, -1}, {0, -1, 0}},  {{-1, 0, 0}, {0, 0, 1}, {0, -1, 0}}, {{0, 1, 0}, {1, 0, 0}, {0, 0, 1}},
-    {{0, -1, 0}, {1, 0, 0}, {0, 0, -1}},  {{0, 0, 1}, {1, 0, 0}, {0, -1, 0}},  {{0, 0, -1}, {-1, 0, 0}, {0, -1, 0}},
+    {{1, 0, 0}, {0, 0, -1}, {0, -1, 0}}, {{-1, 0, 0}, {0, 0, 1}, {0, -1, 0}},
+    {{0, 1, 0}, {1, 0, 0}, {0, 0, 1}},   {{0, -1, 0}, {1, 0, 0}, {0, 0, -1}},
+    {{0, 0, 1}, {1, 0, 0}, {0, -1, 0}},  {{0, 0, -1}, {-1, 0, 0}, {0, -1, 0}},
 };
 
 }  // namespace
@@ -38,6 +41,33 @@ glm::vec3 direction_from_cube(int face, float s, float t) {
   return frame.major + (2.0F * s - 1.0F) * frame.s_axis + (2.0F * t - 1.0F) * frame.t_axis;
 }
 
+MapPoint cube_point_from_direction(glm::dvec3 d) {
+  if (!is_usable(d)) return {0, 0.0, 0.0, false};
+  const glm::dvec3 a = glm::abs(d);
+  int axis = 0;
+  if (a.y > a.x) axis = 1;
+  if (a.z > a[axis]) axis = 2;
+  const int face = 2 * axis + (d[axis] < 0.0 ? 1 : 0);
+  const glm::dvec3 on_cube = d / a[axis];
+  const FaceFrame& frame = kFaces[face];
+  return {face, glm::dot(on_cube, glm::dvec3(frame.s_axis)), -glm::dot(on_cube, glm::dvec3(frame.t_axis)),
+          true};
+}
+
+glm::dvec3 direction_from_cube_point(int face, double x, double y) {
+  const FaceFrame& frame = kFaces[face];
+  return glm::dvec3(frame.major) + x * glm::dvec3(frame.s_axis) - y * glm::dvec3(frame.t_axis);
+}
+
+MapJacobian cube_jacobian(int face, double x, double y) {
+  const glm::dvec3 on_cube = direction_from_cube_point(face, x, y);
+  const double length = glm::length(on_cube);
+  const glm::dvec3 d = on_cube / length;
+  const auto derivative = [&](glm::dvec3 axis) { return (axis - d * glm::dot(d, axis)) / length; };
+  const FaceFrame& frame = kFaces[face];
+  return {derivative(glm::dvec3(frame.s_axis)), derivative(-glm::dvec3(frame.t_axis))};
+}
+
 double cube_texel_solid_angle(int size, int column, int row) {
   const double step = 2.0 / size;
   const double x0 = column * step - 1.0;
@@ -52,9 +82,10 @@ double cube_texel_solid_angle(int size, int column, int row) {
     const auto corner = [](double x, double y) { return std::atan2(x * y, std::sqrt(x * x + y * y + 1.0)); };
     return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0);
   }
-  constexpr double kNodes[5] = {0.0, -0.5384693101056831, 0.5384693101056831, -0.9061798459386640, 0.9061798459386640};
-  constexpr double kWeights[5] = {0.5688888888888889, 0.4786286704993665, 0.4786286704993665, 0.2369268850561891,
-                                  0.2369268850561891};
+  constexpr double kNodes[5] = {0.0, -0.5384693101056831, 0.5384693101056831, -0.9061798459386640,
+                                0.9061798459386640};
+  constexpr double kWeights[5] = {0.5688888888888889, 0.4786286704993665, 0.4786286704993665,
+                                  0.2369268850561891, 0.2369268850561891};
   double sum = 0.0;
   for (int i = 0; i < 5; ++i) {
     const double y = y0 + 0.5 * step * (1.0 + kNodes[i]);

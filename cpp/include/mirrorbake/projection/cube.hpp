@@ -2,6 +2,8 @@
 
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/projection/map_point.hpp"
+
 /// The cube projection (spec P1; [WP]; [EMT] §2.2).
 ///
 /// Faces are ordered +X −X +Y −Y +Z −Z, each oriented as in OpenGL and KTX2, row 0 at the top:
@@ -30,5 +32,12 @@ glm::vec3 direction_from_cube(int face, float s, float t);
 
 /// Solid angle in steradians of texel (column, row) of a face of `size`² texels, relative error ≤ 1e-12.
 double cube_texel_solid_angle(int size, int column, int row);
+
+/// The same in double, with positions counted from the centre of the face: x = 2s − 1, y = 1 − 2t.
+MapPoint cube_point_from_direction(glm::dvec3 direction);
+glm::dvec3 direction_from_cube_point(int face, double x, double y);
+
+/// Of the normalised direction.
+MapJacobian cube_jacobian(int face, double x, double y);
 
 }  // namespace mirrorbake

@@ -1,0 +1,56 @@
+#include "mirrorbake/projection/dual_paraboloid.hpp"
+
+#include <cmath>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "finite_direction.hpp"
+#include "mirrorbake/core/error.hpp"
+
+namespace mirrorbake {
+
+MapPoint dual_paraboloid_from_direction(glm::dvec3 d) {
+  if (!is_usable(d)) return {0, 0.0, 0.0, false};
+  const double length = glm::length(d);
+  const double q = length + std::abs(d.z);
+  return {d.z >= 0.0 ? 0 : 1, d.x / q, d.y / q, true};
+}
+
+glm::dvec3 direction_from_dual_paraboloid(int face, double x, double y) {
+  const double r2 = x * x + y * y;
+  return glm::dvec3(2.0 * x, 2.0 * y, face == 0 ? 1.0 - r2 : r2 - 1.0) / (1.0 + r2);
+}
+
+MapJacobian dual_paraboloid_jacobian(int face, double x, double y) {
+  const double q = 1.0 + x * x + y * y;
+  const glm::dvec3 d = direction_from_dual_paraboloid(face, x, y);
+  const double sign = face == 0 ? -2.0 : 2.0;
+  return {(glm::dvec3(2.0, 0.0, sign * x) - 2.0 * x * d) / q,
+          (glm::dvec3(0.0, 2.0, sign * y) - 2.0 * y * d) / q};
+}
+
+glm::mat4 dual_paraboloid_texture_matrix(const glm::mat3& frame_from_map, int face) {
+  if (face != 0 && face != 1) throw InvalidArgument("face", std::to_string(face), "0 (front) or 1 (back)");
+  const glm::mat3 product = frame_from_map * glm::transpose(frame_from_map);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      if (!(std::abs(product[i][j] - (i == j ? 1.0F : 0.0F)) <= 1e-4F)) {
+        throw InvalidArgument("frame_from_map", "not orthonormal", "a rotation or reflection");
+      }
+    }
+  }
+  // s = ½ + ½ r_x/q and t = ½ − ½ r_y/q with q = 1 ± r_z, in the order A · P · S · M⁻¹ of [EMT]; GLM's matrices
+  // are lists of columns.
+  const float sign = face == 0 ? 1.0F : -1.0F;
+  const glm::mat4 subtract(glm::vec4(1, 0, 0, 0), glm::vec4(0, 1, 0, 0), glm::vec4(0, 0, sign, 0),
+                           glm::vec4(0, 0, 1, 1));
+  const glm::mat4 perspective(glm::vec4(1, 0, 0, 0), glm::vec4(0, 1, 0, 0), glm::vec4(0, 0, 1, 1),
+                              glm::vec4(0, 0, 0, 0));
+  const glm::mat4 to_texture(glm::vec4(0.5F, 0, 0, 0), glm::vec4(0, -0.5F, 0, 0), glm::vec4(0, 0, 1, 0),
+                             glm::vec4(0.5F, 0.5F, 0, 1));
+  return to_texture * perspective * subtract * glm::mat4(glm::transpose(frame_from_map));
+}
+
+}  // namespace mirrorbake

@@ -1,0 +1,35 @@
+#include "mirrorbake/projection/latlong.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "finite_direction.hpp"
+
+namespace mirrorbake {
+namespace {
+constexpr double kPi = std::numbers::pi;
+}
+
+MapPoint latlong_from_direction(glm::dvec3 d) {
+  if (!is_usable(d)) return {0, 0.0, 0.0, false};
+  return {0, std::atan2(d.x, -d.z) / kPi, std::atan2(d.y, std::sqrt(d.x * d.x + d.z * d.z)) / (0.5 * kPi),
+          true};
+}
+
+glm::dvec3 direction_from_latlong(double x, double y) {
+  const double longitude = kPi * x;
+  const double latitude = 0.5 * kPi * y;
+  const double c = std::cos(latitude);
+  return {c * std::sin(longitude), std::sin(latitude), -c * std::cos(longitude)};
+}
+
+MapJacobian latlong_jacobian(double x, double y) {
+  const double sin_long = std::sin(kPi * x);
+  const double cos_long = std::cos(kPi * x);
+  const double sin_lat = std::sin(0.5 * kPi * y);
+  const double cos_lat = std::cos(0.5 * kPi * y);
+  return {kPi * cos_lat * glm::dvec3(cos_long, 0.0, sin_long),
+          0.5 * kPi * glm::dvec3(-sin_lat * sin_long, cos_lat, sin_lat * cos_long)};
+}
+
+}  // namespace mirrorbake

@@ -1,0 +1,417 @@
+"""The scene file: what SCENE.toml may say, its defaults, and errors that name the key.
+
+Lengths are in metres, angles in degrees, colours and radiance scene-linear with Rec.709 primaries. Relative
+paths are relative to the scene file. Keys that are not known are errors, so that a misspelt one is found.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
+
+from mirrorbake.errors import InputError
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+MAX_SCENE_BYTES = 1 << 20
+MAX_IMAGE_SIDE = 16384
+MAX_MAP_SIZE = 4096
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _as_rgb(value: Any) -> Any:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return (value, value, value)
+    return _as_tuple(value)
+
+
+def _power_of_two(value: int) -> int:
+    if value & (value - 1):
+        raise ValueError("Input should be a power of two")
+    return value
+
+
+Vec3: TypeAlias = Annotated[tuple[float, float, float], BeforeValidator(_as_tuple)]
+"""Three numbers."""
+
+Reflectance: TypeAlias = Annotated[
+    tuple[
+        Annotated[float, Field(ge=0, le=1)],
+        Annotated[float, Field(ge=0, le=1)],
+        Annotated[float, Field(ge=0, le=1)],
+    ],
+    BeforeValidator(_as_rgb),
+]
+"""R, G, B in [0,1]; one number stands for all three."""
+
+Index: TypeAlias = Annotated[
+    tuple[
+        Annotated[float, Field(gt=0, le=1e6)],
+        Annotated[float, Field(gt=0, le=1e6)],
+        Annotated[float, Field(gt=0, le=1e6)],
+    ],
+    BeforeValidator(_as_rgb),
+]
+"""Real part of a refractive index per channel; one number stands for all three."""
+
+Extinction: TypeAlias = Annotated[
+    tuple[
+        Annotated[float, Field(ge=0, le=1e6)],
+        Annotated[float, Field(ge=0, le=1e6)],
+        Annotated[float, Field(ge=0, le=1e6)],
+    ],
+    BeforeValidator(_as_rgb),
+]
+"""Imaginary part of a refractive index per channel; one number stands for all three."""
+
+ImageSide: TypeAlias = Annotated[int, Field(ge=1, le=MAX_IMAGE_SIDE)]
+MapSize: TypeAlias = Annotated[int, Field(ge=1, le=MAX_MAP_SIZE), AfterValidator(_power_of_two)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Reflector(_Section):
+    """[reflector]: the shiny object. It stands on y = 0, the table's top or the ground."""
+
+    object: Literal["teapot"] | None = None
+    """A built-in object; or give `mesh`."""
+    mesh: str | None = None
+    """An .obj, .gltf or .glb file; or give `object`."""
+    height: Annotated[float, Field(gt=0, le=1e4)] = 0.15
+    """The object is scaled to this height (the teapot: of its body)."""
+    scale: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    """Scales a mesh's own units to metres, instead of `height`."""
+    rotation: Vec3 = (0.0, 0.0, 0.0)
+    """Degrees about x, then y, then z, before the object is set on the ground. -90 about x lifts +Z up to
+    +Y."""
+    position: Vec3 = (0.0, 0.0, 0.0)
+    """Where the centre of the object's base stands."""
+    subdivisions: Annotated[int, Field(ge=1, le=128)] = 25
+    """The teapot's tessellation: every patch becomes subdivisions² · 2 triangles."""
+    parts: Literal["split", "joined"] = "split"
+    """Whether each part (the teapot's lid and body) gets maps of its own."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Reflector:
+        if (self.object is None) == (self.mesh is None):
+            raise ValueError("give either `object` or `mesh`")
+        if self.object is not None and self.scale is not None:
+            raise ValueError("`scale` is for meshes; set the teapot's `height`")
+        return self
+
+
+class MaterialConfig(_Section):
+    """[material]: what the reflector is made of."""
+
+    fresnel: Literal["constant", "schlick", "dielectric", "conductor"] = "schlick"
+    r0: Reflectance | None = None
+    """`constant`: reflectance; `schlick`: at normal incidence. Default 0.9."""
+    ior: Index | None = None
+    """`dielectric`: relative index of refraction. Default 1.5."""
+    eta: Index | None = None
+    """`conductor`: real part of the relative index. Required there."""
+    k: Extinction | None = None
+    """`conductor`: extinction coefficient. Required there."""
+    albedo: Reflectance = (0.0, 0.0, 0.0)
+    """Diffuse reflectance under the mirror lobe; black has no diffuse layer."""
+    texture: str | None = None
+    """Image that multiplies the albedo, on the mesh's texture coordinates."""
+    layers: Literal["additive", "coated"] = "additive"
+    """`additive`: F·L + D; `coated`: F·L + (1 - F)·D."""
+
+    @model_validator(mode="after")
+    def _parameters_fit_the_model(self) -> MaterialConfig:
+        used = {"constant": {"r0"}, "schlick": {"r0"}, "dielectric": {"ior"}, "conductor": {"eta", "k"}}
+        for key in ("r0", "ior", "eta", "k"):
+            if getattr(self, key) is not None and key not in used[self.fresnel]:
+                raise ValueError(f"`{key}` has no meaning for fresnel = {self.fresnel!r}")
+        if self.fresnel == "conductor" and (self.eta is None or self.k is None):
+            raise ValueError("fresnel = 'conductor' needs `eta` and `k`")
+        return self
+
+
+class Ground(_Section):
+    """[surroundings.ground]: a diffuse disc below the object, for surroundings that have none."""
+
+    radius: Annotated[float, Field(gt=0, le=1e4)] = 0.5
+    albedo: Reflectance = (0.5, 0.5, 0.5)
+
+
+class Surroundings(_Section):
+    """[surroundings]: what the object mirrors."""
+
+    room: Literal["furnished"] | None = None
+    """A built-in room; or give `panorama`."""
+    panorama: str | None = None
+    """A latitude-longitude EXR or HDR image, its centre along -Z, +Y up; or give `room`."""
+    rotation: float = 0.0
+    """Of the panorama, counter-clockwise about +Y seen from above."""
+    scale: Annotated[float, Field(gt=0, le=1e6)] = 1.0
+    """Factor on the panorama's radiance."""
+    ground: Ground | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Surroundings:
+        if (self.room is None) == (self.panorama is None):
+            raise ValueError("give either `room` or `panorama`")
+        if self.room is not None and self.ground is not None:
+            raise ValueError("`ground` is for panoramas: a room has its own table")
+        return self
+
+
+class Views(_Section):
+    """[views]: the cameras, evenly spaced on an arc about the vertical through `centre`.
+
+    The eye of parameter t in [0,1] is at centre + (radius·sin a, height, radius·cos a), a = start +
+    t·degrees, and looks at the centre.
+    """
+
+    centre: Vec3 | None = None
+    """Default: the middle of the object's bounding box."""
+    radius: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    """Default: so far that the object's bounding sphere fills the frame."""
+    height: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
+    """Of the eye above the centre. Default: the eye looks down at 20 degrees."""
+    start: Annotated[float, Field(ge=-3600, le=3600)] = 0.0
+    degrees: Annotated[float, Field(ge=-360, le=360)] = 99.0
+    """Length of the arc."""
+    count: Annotated[int, Field(ge=1, le=100_000)] = 100
+    fov: Annotated[float, Field(gt=0, lt=180)] = 30.0
+    """Vertical field of view."""
+    size: Annotated[tuple[ImageSide, ImageSide], BeforeValidator(_as_tuple)] = (512, 512)
+    """Pixels: width, height."""
+
+    def parameters(self) -> list[float]:
+        """The parameter t of every view, from 0 to 1 (a single view: 0)."""
+        return [i / (self.count - 1) if self.count > 1 else 0.0 for i in range(self.count)]
+
+
+class Layers(_Section):
+    """[layers]: which layers the maps have."""
+
+    local: Literal["auto", "on", "off"] = "auto"
+    """The layer of the object's reflection in itself. `auto`: for the parts that show one in a trial trace;
+    `off`: a single map holds everything."""
+
+
+class Maps(_Section):
+    """[maps]: the environment maps."""
+
+    size: MapSize = 256
+    """Texels along a side of a cube face, a power of two."""
+    distant: Literal["auto", "box", "infinite"] = "auto"
+    """Geometry of the distant layer. `auto`: a box in a room, infinite under a panorama."""
+    box: Literal["robust", "mean_distance"] = "robust"
+    """How the box is fitted to the surroundings that the object sees: by robust least squares, or with its
+    bottom below the object and the other sides at the mean distance ([PEM] §4)."""
+    precision: Literal["float16", "float32"] = "float16"
+    """Storage of the maps on disk."""
+
+
+class Trace(_Section):
+    """[trace]: the ray tracer."""
+
+    samples: Annotated[int, Field(ge=1, le=65536)] = 16
+    """Per pixel."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    indirect: Literal["none", "cached", "path"] = "cached"
+    """Diffuse light from other diffuse surfaces."""
+
+
+class Infer(_Section):
+    """[infer]: how the maps are solved for."""
+
+    smoothness: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
+    """Weight λ of differences between neighbouring texels: small fits the sampled view best, large survives
+    longer away from it."""
+    level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
+    """Weight λ of a texel's difference from the mean of the four below it in the pyramid."""
+    prior: Literal["smooth", "captured"] = "smooth"
+    """What the distant map's texels that a view does not determine fall back to: a smooth fill, or the
+    captured surroundings."""
+    prior_weight: Annotated[float, Field(ge=0, le=1e6)] = 1e-2
+    """Weight λ of the difference from the captured surroundings."""
+    footprint_scale: Annotated[float, Field(gt=0, le=4)] = 0.5
+    """Size of a lookup's footprint in pixels: 1 filters as graphics hardware does for one sample per pixel,
+    less is sharper for supersampled images."""
+    iterations: Annotated[int, Field(ge=0, le=100_000)] = 200
+    """At most, per layer and view."""
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-3
+    """The solver stops when its gradient has shrunk to this fraction."""
+
+
+class SceneConfig(_Section):
+    """A whole scene file."""
+
+    reflector: Reflector = Reflector(object="teapot")
+    material: MaterialConfig = MaterialConfig()
+    surroundings: Surroundings = Surroundings(room="furnished")
+    views: Views = Views()
+    layers: Layers = Layers()
+    maps: Maps = Maps()
+    trace: Trace = Trace()
+    infer: Infer = Infer()
+
+
+PATH_KEYS = (("reflector", "mesh"), ("material", "texture"), ("surroundings", "panorama"))
+"""The keys whose values are files."""
+
+_EXPECTATIONS = {
+    "extra_forbidden": "is not a key of this section",
+    "missing": "is required",
+    "model_type": "should be a section",
+}
+
+
+def _describe(error: ErrorDetails) -> str:
+    # Steps such as 'function-before[...]' are pydantic's own, not keys of the file.
+    key = ".".join(str(step) for step in error["loc"] if "[" not in str(step))
+    kind = error["type"]
+    if kind in _EXPECTATIONS:
+        return f"{key}: {_EXPECTATIONS[kind]}"
+    message = error["msg"].removeprefix("Value error, ").replace("Input should", "should")
+    if isinstance(error["input"], Mapping):
+        return f"{key}: {message}"
+    return f"{key} = {error['input']!r}: {message}"
+
+
+def parse_config(data: Mapping[str, Any], source: str) -> SceneConfig:
+    """Validate a scene given as nested mappings.
+
+    Parameters
+    ----------
+    data
+        What a TOML parser gives for a scene file.
+    source
+        Name that error messages start with.
+
+    Raises
+    ------
+    InputError
+        Names the first wrong key, its value and what was expected.
+
+    Examples
+    --------
+    >>> parse_config({"maps": {"size": 128}}, "example").maps.size
+    128
+    >>> parse_config({"maps": {"size": 100}}, "example")
+    Traceback (most recent call last):
+    mirrorbake.errors.InputError: example: maps.size = 100: should be a power of two
+    """
+    try:
+        return SceneConfig.model_validate(data)
+    except ValidationError as failure:
+        errors = failure.errors()
+        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+        raise InputError(f"{source}: {_describe(errors[0])}{more}") from None
+
+
+def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
+    """Split `section.key=value` into the key path and the value, read as TOML or else as a plain string.
+
+    Examples
+    --------
+    >>> parse_override("maps.size=128")
+    (('maps', 'size'), 128)
+    >>> parse_override("reflector.mesh=bunny.obj")
+    (('reflector', 'mesh'), 'bunny.obj')
+    """
+    key, separator, value = text.partition("=")
+    path = tuple(step.strip() for step in key.split("."))
+    if not separator or len(path) < 2 or not all(path):
+        raise InputError(f"--set {text!r}: expected section.key=value")
+    try:
+        return path, tomllib.loads(f"value = {value.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        return path, value.strip()
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        size = path.stat().st_size
+        if size > MAX_SCENE_BYTES:
+            raise InputError(f"{path}: {size} bytes, a scene file has at most {MAX_SCENE_BYTES}")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as failure:
+        raise InputError(f"{path}: {failure.strerror or failure}") from None
+    except UnicodeDecodeError as failure:
+        raise InputError(f"{path}: not UTF-8 text (byte {failure.start})") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as failure:
+        raise InputError(f"{path}: not valid TOML: {failure}") from None
+
+
+def load_config(path: Path, overrides: Sequence[tuple[tuple[str, ...], Any]] = ()) -> SceneConfig:
+    """Read and validate a scene file.
+
+    Parameters
+    ----------
+    path
+        The TOML file. Relative paths in it are resolved against its folder.
+    overrides
+        Key paths with values that replace the file's, as of `parse_override`; relative paths in them are
+        resolved against the current folder. An override of `reflector.mesh` drops `reflector.object`, and so
+        on.
+
+    Raises
+    ------
+    InputError
+        The file is missing or not TOML, or a key is wrong.
+    """
+    data = _read_toml(path)
+    _resolve_paths(data, path.resolve().parent)
+    replacements: dict[str, Any] = {}
+    for keys, value in overrides:
+        _insert(replacements, keys, value)
+    _resolve_paths(replacements, Path.cwd())
+    _merge(data, replacements)
+    return parse_config(data, str(path))
+
+
+_ALTERNATIVES = {
+    "reflector.mesh": "object",
+    "reflector.object": "mesh",
+    "surroundings.panorama": "room",
+    "surroundings.room": "panorama",
+}
+
+
+def _insert(data: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
+    for key in keys[:-1]:
+        data = data.setdefault(key, {})
+        if not isinstance(data, dict):
+            raise InputError(f"--set {'.'.join(keys)}: {key} is not a section")
+    data[keys[-1]] = value
+
+
+def _merge(data: dict[str, Any], replacements: Mapping[str, Any], path: tuple[str, ...] = ()) -> None:
+    for key, value in replacements.items():
+        if isinstance(value, Mapping) and isinstance(data.get(key), dict):
+            _merge(data[key], value, (*path, key))
+            continue
+        data[key] = value
+        data.pop(_ALTERNATIVES.get(".".join((*path, key)), ""), None)
+
+
+def _resolve_paths(data: Mapping[str, Any], folder: Path) -> None:
+    for section, key in PATH_KEYS:
+        table = data.get(section)
+        if isinstance(table, dict) and isinstance(table.get(key), str):
+            table[key] = str(folder / table[key])

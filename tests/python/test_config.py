@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from mirrorbake.config import PATH_KEYS, SceneConfig, load_config, parse_config, parse_override
+from mirrorbake.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_an_empty_scene_is_the_teapot_in_its_room_at_the_papers_size() -> None:
+    config = parse_config({}, "scene")
+    assert config.reflector.object == "teapot"
+    assert config.reflector.subdivisions == 25
+    assert config.surroundings.room == "furnished"
+    assert (config.views.count, config.views.degrees) == (100, 99.0)
+    assert config.views.size == (512, 512)
+    assert config.maps.size == 256
+    assert config.trace.samples == 16
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"maps": {"size": 100}}, "scene: maps.size = 100: should be a power of two"),
+        ({"maps": {"size": 0}}, "scene: maps.size = 0: should be greater than or equal to 1"),
+        ({"maps": {"size": 8192}}, "scene: maps.size = 8192: should be less than or equal to 4096"),
+        ({"maps": {"size": 64.0}}, "scene: maps.size = 64.0: should be a valid integer"),
+        ({"maps": {"sise": 64}}, "scene: maps.sise: is not a key of this section"),
+        ({"map": {}}, "scene: map: is not a key of this section"),
+        ({"maps": 3}, "scene: maps: should be a section"),
+        ({"views": {"count": 0}}, "scene: views.count = 0: should be greater than or equal to 1"),
+        ({"views": {"size": [512, 0]}}, "scene: views.size.1 = 0: should be greater than or equal to 1"),
+        (
+            {"views": {"size": [512, 16385]}},
+            "scene: views.size.1 = 16385: should be less than or equal to 16384",
+        ),
+        ({"views": {"size": [512]}}, "scene: views.size.1: is required"),
+        ({"views": {"fov": 180}}, "scene: views.fov = 180: should be less than 180"),
+        ({"views": {"fov": float("nan")}}, "scene: views.fov = nan: should be a finite number"),
+        ({"views": {"centre": [0, 1]}}, "scene: views.centre.2: is required"),
+        (
+            {"views": {"centre": [0, 1, float("inf")]}},
+            "scene: views.centre.2 = inf: should be a finite number",
+        ),
+        ({"trace": {"samples": 0}}, "scene: trace.samples = 0: should be greater than or equal to 1"),
+        ({"trace": {"samples": True}}, "scene: trace.samples = True: should be a valid integer"),
+        ({"reflector": {"object": "cow"}}, "scene: reflector.object = 'cow': should be 'teapot'"),
+        ({"reflector": {}}, "scene: reflector: give either `object` or `mesh`"),
+        (
+            {"reflector": {"object": "teapot", "mesh": "a.obj"}},
+            "scene: reflector: give either `object` or `mesh`",
+        ),
+        ({"surroundings": {}}, "scene: surroundings: give either `room` or `panorama`"),
+        (
+            {"material": {"r0": 1.5}},
+            "scene: material.r0.0 = 1.5: should be less than or equal to 1 (and 2 more)",
+        ),
+        (
+            {"material": {"ior": 1.5}},
+            "scene: material: `ior` has no meaning for fresnel = 'schlick'",
+        ),
+        (
+            {"material": {"fresnel": "conductor", "eta": 0.2}},
+            "scene: material: fresnel = 'conductor' needs `eta` and `k`",
+        ),
+    ],
+)
+def test_a_wrong_key_is_named_with_its_value_and_what_was_expected(
+    data: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_config(data, "scene")
+    assert str(caught.value) == message
+
+
+def test_one_number_stands_for_all_three_channels() -> None:
+    config = parse_config({"material": {"fresnel": "dielectric", "ior": 1.5}}, "scene")
+    assert config.material.ior == (1.5, 1.5, 1.5)
+
+
+def test_views_are_spread_evenly_from_0_to_1() -> None:
+    assert parse_config({"views": {"count": 5}}, "scene").views.parameters() == [0, 0.25, 0.5, 0.75, 1]
+    assert parse_config({"views": {"count": 1}}, "scene").views.parameters() == [0]
+
+
+def test_a_config_survives_the_way_through_json() -> None:
+    import json
+
+    config = parse_config({"material": {"albedo": 0.2}, "views": {"centre": [0, 0.1, 0]}}, "scene")
+    assert parse_config(json.loads(config.model_dump_json()), "copy") == config
+
+
+def test_paths_are_relative_to_the_scene_file_and_overrides_to_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, elsewhere = tmp_path / "scenes", tmp_path / "elsewhere"
+    folder.mkdir()
+    elsewhere.mkdir()
+    scene = folder / "scene.toml"
+    scene.write_text('[reflector]\nmesh = "cow.obj"\n[surroundings]\npanorama = "/abs/sky.exr"\n')
+    monkeypatch.chdir(elsewhere)
+    config = load_config(scene)
+    assert config.reflector.mesh == str(folder / "cow.obj")
+    assert config.surroundings.panorama == "/abs/sky.exr"
+    config = load_config(scene, [parse_override("reflector.mesh=bunny.obj")])
+    assert config.reflector.mesh == str(elsewhere / "bunny.obj")
+
+
+def test_an_override_of_the_mesh_replaces_the_built_in_object(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[reflector]\nobject = "teapot"\n[surroundings]\nroom = "furnished"\n')
+    overrides = [
+        "reflector.mesh=/m.obj",
+        "surroundings.panorama=/p.exr",
+        "maps.size=32",
+        "views.centre=[0,1,0]",
+    ]
+    config = load_config(scene, [parse_override(text) for text in overrides])
+    assert (config.reflector.object, config.reflector.mesh) == (None, "/m.obj")
+    assert (config.surroundings.room, config.surroundings.panorama) == (None, "/p.exr")
+    assert config.maps.size == 32
+    assert config.views.centre == (0, 1, 0)
+
+
+@pytest.mark.parametrize("text", ["maps.size", "size=3", "=3", "maps.=3", ""])
+def test_an_override_without_a_key_path_is_rejected(text: str) -> None:
+    with pytest.raises(InputError, match=r"expected section\.key=value"):
+        parse_override(text)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"[views\ncount = 3\n", "not valid TOML: "),
+        (b"[views]\ncount = \n", "not valid TOML: .*line 2"),
+        (b'title = "\xff\xfe"', "not UTF-8 text"),
+        (b"a = " + b"[" * 100_000, "not valid TOML"),
+        (b"#" * (1 << 20) + b"#", "at most 1048576"),
+    ],
+)
+def test_a_file_that_is_not_toml_is_one_clear_error(tmp_path: Path, content: bytes, message: str) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_bytes(content)
+    with pytest.raises(InputError, match=message) as caught:
+        load_config(scene)
+    assert str(caught.value).startswith(str(scene))
+
+
+def test_a_missing_scene_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nowhere\.toml: No such file"):
+        load_config(tmp_path / "nowhere.toml")
+
+
+def test_every_key_of_the_scene_file_is_in_its_reference_page(request: pytest.FixtureRequest) -> None:
+    page = request.config.rootpath / "docs" / "reference" / "scene-toml.md"
+    text = page.read_text(encoding="utf-8")
+    for section, field in SceneConfig.model_fields.items():
+        assert f"`[{section}]`" in text
+        assert isinstance(field.default, object)
+        for key in type(getattr(SceneConfig(), section)).model_fields:
+            assert f"`{key}`" in text, f"{section}.{key} is not documented"
+    for section, key in PATH_KEYS:
+        assert key in type(getattr(SceneConfig(), section)).model_fields

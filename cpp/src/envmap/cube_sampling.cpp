@@ -8,24 +8,20 @@
 #include "mirrorbake/projection/cube.hpp"
 
 namespace mirrorbake {
-namespace {
 
-// Texel of a face whose row or column (not both) may be one outside of the face: the neighbour's texel there. Its
-// direction, seen from the neighbouring face, is shifted along the edge by less than half a texel, so that it still
-// falls into the texel across the edge.
-std::uint32_t texel_across_edge(const CubePyramidLayout& layout, int level, int face, int row, int column) {
+std::uint32_t cube_texel_across_edges(const CubePyramidLayout& layout, int level, int face, int row, int column) {
   const int n = layout.level_size(level);
+  if (row >= 0 && row < n && column >= 0 && column < n) {
+    return static_cast<std::uint32_t>(layout.index(level, face, row, column));
+  }
+  // The direction of the missing texel's centre, seen from the neighbouring face, is shifted along the edge by less
+  // than half a texel, so that it still falls into the texel across the edge.
   const float scale = 1.0F / static_cast<float>(n);
-  const glm::vec3 direction = direction_from_cube(face, (static_cast<float>(column) + 0.5F) * scale,
-                                                  (static_cast<float>(row) + 0.5F) * scale);
-  const CubeCoordinates c = cube_from_direction(direction);
-  const int last = n - 1;
-  return static_cast<std::uint32_t>(layout.index(level, c.face,
-                                                 std::min(static_cast<int>(c.t * static_cast<float>(n)), last),
-                                                 std::min(static_cast<int>(c.s * static_cast<float>(n)), last)));
+  const CubeCoordinates c = cube_from_direction(direction_from_cube(
+      face, (static_cast<float>(column) + 0.5F) * scale, (static_cast<float>(row) + 0.5F) * scale));
+  const auto texel = [n](float s) { return std::min(static_cast<int>(s * static_cast<float>(n)), n - 1); };
+  return static_cast<std::uint32_t>(layout.index(level, c.face, texel(c.t), texel(c.s)));
 }
-
-}  // namespace
 
 void add_bilinear(const CubePyramidLayout& layout, int level, glm::vec3 direction, float scale,
                   CubeFootprint& footprint) {
@@ -62,10 +58,8 @@ void add_bilinear(const CubePyramidLayout& layout, int level, glm::vec3 directio
     const bool column_outside = k < 0 || k >= n;
     if (row_outside && column_outside) {
       missing = weights[i];
-    } else if (row_outside || column_outside) {
-      append(texel_across_edge(layout, level, c.face, r, k), weights[i]);
     } else {
-      append(layout.index(level, c.face, r, k), weights[i]);
+      append(cube_texel_across_edges(layout, level, c.face, r, k), weights[i]);
     }
   }
   if (missing > 0.0F) {

@@ -22,6 +22,10 @@ struct CubeFootprint {
   int count = 0;
 };
 
+/// Index of the texel at (row, column) of a face, where at most one of the two may lie one outside of the face: the
+/// neighbouring face's texel across that edge.
+std::uint32_t cube_texel_across_edges(const CubePyramidLayout& layout, int level, int face, int row, int column);
+
 /// Four texels of `level` around `direction`, bilinear and seamless: beyond the edge of a face lie the texels of
 /// its neighbour, and at a corner, where only three texels meet, the fourth is their mean, as in OpenGL
 /// (GL_TEXTURE_CUBE_MAP_SEAMLESS), Vulkan and WebGL2. The weights sum to 1. Appends to `footprint`, scaled by `scale`.

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "mirrorbake/core/parallel.hpp"
+
+namespace mirrorbake {
+
+/// The channels of one texel or pixel, in one SIMD register; maps of fewer channels leave the rest zero.
+using Channels = float __attribute__((vector_size(16)));
+using ChannelSums = std::array<double, 4>;
+
+inline constexpr std::size_t kVectorGrain = 8192;
+
+inline Channels broadcast(float value) { return Channels{value, value, value, value}; }
+
+/// Sum of `body(begin, end)` over chunks, per channel, added up in the order of the chunks.
+template <typename Body>
+ChannelSums parallel_channel_sums(std::size_t count, const Body& body) {
+  std::vector<ChannelSums> partial((count + kVectorGrain - 1) / kVectorGrain);
+  parallel_for(count, kVectorGrain, [&](std::size_t begin, std::size_t end) {
+    partial[begin / kVectorGrain] = body(begin, end);
+  });
+  ChannelSums sums{};
+  for (const ChannelSums& part : partial) {
+    for (std::size_t k = 0; k < 4; ++k) sums[k] += part[k];
+  }
+  return sums;
+}
+
+inline void add_product(ChannelSums& sums, Channels a, Channels b) {
+  for (std::size_t k = 0; k < 4; ++k) sums[k] += static_cast<double>(a[k]) * static_cast<double>(b[k]);
+}
+
+inline std::vector<Channels> widen(std::span<const float> values, int channels) {
+  const std::size_t c = static_cast<std::size_t>(channels);
+  std::vector<Channels> wide(values.size() / c);
+  for (std::size_t i = 0; i < wide.size(); ++i) {
+    Channels v{};
+    for (std::size_t k = 0; k < c; ++k) v[k] = values[i * c + k];
+    wide[i] = v;
+  }
+  return wide;
+}
+
+}  // namespace mirrorbake

@@ -1,0 +1,292 @@
+#include "mirrorbake/inference/map_solver.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "mirror_sphere.hpp"
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+
+namespace mirrorbake {
+namespace {
+
+const Proxy kInfinity{InfiniteSphere{}, {0.0F, 0.0F, 0.0F}};
+
+struct Problem {
+  CubePyramidLayout layout;
+  RenderingMatrix matrix;
+  std::vector<float> row_weights;
+};
+
+Problem make_problem(int image, int samples_per_pixel, int size) {
+  Problem problem;
+  const SurfaceSamples samples = testing::mirror_sphere_samples(image, samples_per_pixel);
+  problem.layout = CubePyramidLayout::full(size);
+  problem.matrix = build_rendering_matrix(samples, 0, kInfinity, problem.layout);
+  problem.row_weights = testing::random_values(problem.matrix.rows(), 3);
+  return problem;
+}
+
+Eigen::MatrixXd dense(const RenderingMatrix& matrix) {
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(matrix.rows()),
+                                            static_cast<Eigen::Index>(matrix.columns));
+  for (std::size_t r = 0; r < matrix.rows(); ++r) {
+    for (std::uint64_t e = matrix.row_offsets[r]; e < matrix.row_offsets[r + 1]; ++e) {
+      a(static_cast<Eigen::Index>(r), matrix.texels[e]) = static_cast<double>(matrix.weights[e]);
+    }
+  }
+  return a;
+}
+
+// Rows of the regulariser written down from its definition, one per term.
+Eigen::MatrixXd dense_regulariser(const CubePyramidLayout& layout, const std::set<std::uint32_t>& seen,
+                                  const SolveOptions& options, double prior_weight) {
+  std::vector<Eigen::VectorXd> rows;
+  const auto n = static_cast<Eigen::Index>(layout.texels());
+  for (int level = 0; level < layout.levels; ++level) {
+    const int size = layout.level_size(level);
+    for (int face = 0; face < 6; ++face) {
+      for (int row = 0; row < size; ++row) {
+        for (int column = 0; column < size; ++column) {
+          const auto i = static_cast<std::uint32_t>(layout.index(level, face, row, column));
+          if (!seen.contains(i)) continue;
+          // Each edge is met from both of its ends, so each visit carries half of its square.
+          for (const auto& [dr, dc] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+            const std::uint32_t j = cube_texel_across_edges(layout, level, face, row + dr, column + dc);
+            if (!seen.contains(j)) continue;
+            Eigen::VectorXd v = Eigen::VectorXd::Zero(n);
+            v(i) += std::sqrt(0.5 * static_cast<double>(options.smoothness));
+            v(j) -= std::sqrt(0.5 * static_cast<double>(options.smoothness));
+            rows.push_back(v);
+          }
+          std::vector<std::uint32_t> children;
+          for (int child = 0; level > 0 && child < 4; ++child) {
+            const auto c = static_cast<std::uint32_t>(
+                layout.index(level - 1, face, 2 * row + child / 2, 2 * column + child % 2));
+            if (seen.contains(c)) children.push_back(c);
+          }
+          if (!children.empty()) {
+            const double count = static_cast<double>(children.size());
+            const double w = std::sqrt(static_cast<double>(options.level_agreement) * count / 4.0);
+            Eigen::VectorXd v = Eigen::VectorXd::Zero(n);
+            v(i) = w;
+            for (std::uint32_t c : children) v(c) = -w / count;
+            rows.push_back(v);
+          }
+          Eigen::VectorXd v = Eigen::VectorXd::Zero(n);
+          v(i) = std::sqrt(prior_weight);
+          rows.push_back(v);
+        }
+      }
+    }
+  }
+  Eigen::MatrixXd g(static_cast<Eigen::Index>(rows.size()), n);
+  for (std::size_t r = 0; r < rows.size(); ++r) g.row(static_cast<Eigen::Index>(r)) = rows[r];
+  return g;
+}
+
+// The solution of the same problem by dense normal equations in double.
+TEST(MapSolver, AgreesWithADenseSolve) {
+  const Problem problem = make_problem(24, 4, 8);
+  SolveOptions options;
+  options.smoothness = 0.02F;
+  options.level_agreement = 0.05F;
+  options.prior_weight = 0.03F;
+  options.tolerance = 1e-7F;
+  options.max_iterations = 2000;
+  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, options);
+  const std::vector<float> target = testing::random_values(3 * problem.matrix.rows(), 7);
+  const std::vector<float> prior = testing::random_values(3 * problem.layout.texels(), 8);
+
+  const std::set<std::uint32_t> seen(problem.matrix.texels.begin(), problem.matrix.texels.end());
+  ASSERT_LT(seen.size(), problem.layout.texels()) << "the test wants unseen texels too";
+  const Eigen::MatrixXd a = dense(problem.matrix);
+  const Eigen::VectorXd w =
+      Eigen::Map<const Eigen::VectorXf>(problem.row_weights.data(), a.rows()).cast<double>();
+  for (const bool with_prior : {false, true}) {
+    const Eigen::MatrixXd g = dense_regulariser(problem.layout, seen, options, with_prior ? 0.03F : 0.0);
+    Eigen::MatrixXd normal = a.transpose() * w.asDiagonal() * a + g.transpose() * g;
+    for (Eigen::Index i = 0; i < normal.rows(); ++i) {
+      if (!seen.contains(static_cast<std::uint32_t>(i))) normal(i, i) = 1.0;
+    }
+    const MapSolution solution =
+        solver.solve(target, 3, with_prior ? std::span<const float>(prior) : std::span<const float>{});
+    EXPECT_EQ(solution.report.unknowns, seen.size());
+    for (int k = 0; k < 3; ++k) {
+      Eigen::VectorXd b(a.rows());
+      Eigen::VectorXd base = Eigen::VectorXd::Zero(a.cols());
+      for (Eigen::Index r = 0; r < b.size(); ++r) b(r) = static_cast<double>(target[static_cast<std::size_t>(3 * r + k)]);
+      for (Eigen::Index i = 0; with_prior && i < base.size(); ++i) {
+        base(i) = static_cast<double>(prior[static_cast<std::size_t>(3 * i + k)]);
+      }
+      const Eigen::VectorXd x = base + normal.ldlt().solve(a.transpose() * (w.asDiagonal() * (b - a * base)));
+      for (std::uint32_t i : seen) {
+        // The gradient is reduced to 1e-7 of its start; the smallest curvature of this problem is about 1e-2.
+        EXPECT_NEAR(static_cast<double>(solution.texels[3 * i + static_cast<std::size_t>(k)]), std::max(x(i), 0.0), 2e-4)
+            << "prior " << with_prior << ", texel " << i << ", channel " << k;
+      }
+    }
+  }
+}
+
+TEST(MapSolver, ReproducesATargetThatAMapCanMake) {
+  const Problem problem = make_problem(64, 4, 32);
+  SolveOptions options;
+  options.smoothness = 1e-7F;
+  options.level_agreement = 1e-7F;
+  options.tolerance = 1e-6F;
+  options.max_iterations = 3000;
+  const std::vector<float> truth = testing::random_values(4 * problem.layout.texels(), 1);
+  const std::vector<float> target = multiply(problem.matrix, truth, 4);
+  const MapSolution solution = MapSolver(problem.matrix, problem.row_weights, problem.layout, options).solve(target, 4);
+  EXPECT_LT(solution.report.rms_error, 1e-3);
+}
+
+// Scaling the light scales the solution: nothing in the solver has a unit.
+TEST(MapSolver, IsLinearOverTenOrdersOfRadiance) {
+  const Problem problem = make_problem(32, 4, 16);
+  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
+  const std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);
+  const MapSolution unit = solver.solve(target, 1);
+  for (float scale : {1e-4F, 1e6F}) {
+    std::vector<float> scaled = target;
+    for (float& value : scaled) value *= scale;
+    const MapSolution solution = solver.solve(scaled, 1);
+    for (std::size_t i = 0; i < solution.texels.size(); ++i) {
+      ASSERT_NEAR(solution.texels[i] / scale, unit.texels[i], 1e-4F);
+    }
+  }
+}
+
+TEST(MapSolver, SolvesATargetThatSpansTenOrdersOfRadiance) {
+  const Problem problem = make_problem(32, 4, 16);
+  std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);
+  for (float& value : target) value = std::pow(10.0F, 10.0F * value - 4.0F);
+  const MapSolution solution = MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 1);
+  for (float value : solution.texels) ASSERT_TRUE(std::isfinite(value) && value >= 0.0F);
+}
+
+TEST(MapSolver, SameBitsOnOneThread) {
+  const Problem problem = make_problem(96, 4, 64);
+  const std::vector<float> target = testing::random_values(3 * problem.matrix.rows(), 5);
+  const auto solve = [&] { return MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 3); };
+  const MapSolution all = solve();
+  const ThreadLimit limit(1);
+  const MapSolution one = solve();
+  EXPECT_EQ(all.texels, one.texels);
+  EXPECT_EQ(all.report.iterations, one.report.iterations);
+}
+
+TEST(MapSolver, FillsUnseenTexelsBetweenTheSeenOnes) {
+  const Problem problem = make_problem(24, 4, 16);
+  const std::vector<float> target(problem.matrix.rows(), 0.7F);
+  const MapSolution solution = MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 1);
+  for (float value : solution.texels) ASSERT_NEAR(value, 0.7F, 1e-5F);
+}
+
+TEST(MapSolver, FallsBackToThePriorWhereNothingIsSeen) {
+  const Problem problem = make_problem(24, 4, 16);
+  const std::vector<float> prior = testing::random_values(problem.layout.texels(), 11);
+  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
+  // A target that the prior explains leaves it as it is, seen or not.
+  const MapSolution same = solver.solve(multiply(problem.matrix, prior, 1), 1, prior);
+  for (std::size_t i = 0; i < prior.size(); ++i) ASSERT_NEAR(same.texels[i], prior[i], 1e-5F);
+  // Whatever the target, the direction that no sample of this part reflects keeps the prior's value: straight down,
+  // which only the lower half of the sphere, part 1, sees.
+  const MapSolution other = solver.solve(std::vector<float>(problem.matrix.rows(), 5.0F), 1, prior);
+  const std::size_t down = problem.layout.index(0, 3, 8, 8);
+  EXPECT_NEAR(other.texels[down], prior[down], 0.6F);
+  EXPECT_LT(std::abs(other.texels[down] - prior[down]), 0.2F * (5.0F - prior[down]));
+}
+
+TEST(MapSolver, ClampsToRadianceAndCoverage) {
+  const Problem problem = make_problem(24, 4, 16);
+  const std::vector<float> high(4 * problem.matrix.rows(), 3.0F);
+  const std::vector<float> low(4 * problem.matrix.rows(), -3.0F);
+  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
+  const MapSolution above = solver.solve(high, 4);
+  const MapSolution below = solver.solve(low, 4);
+  for (std::size_t i = 0; i < above.texels.size(); ++i) {
+    ASSERT_NEAR(above.texels[i], i % 4 == 3 ? 1.0F : 3.0F, 1e-4F);
+    ASSERT_EQ(below.texels[i], 0.0F);
+  }
+}
+
+TEST(MapSolver, AnswersWithoutRowsWithoutWeightsAndWithoutARegulariser) {
+  RenderingMatrix nothing;
+  nothing.columns = CubePyramidLayout::full(4).texels();
+  nothing.row_offsets = {0};
+  const MapSolution empty = MapSolver(nothing, {}, CubePyramidLayout::full(4), {}).solve({}, 3);
+  EXPECT_EQ(empty.texels, std::vector<float>(3 * nothing.columns, 0.0F));
+  EXPECT_EQ(empty.report.unknowns, 0u);
+
+  SolveOptions free;
+  free.smoothness = free.level_agreement = free.prior_weight = 0.0F;
+  const Problem problem = make_problem(16, 1, 16);
+  const std::vector<float> target = testing::random_values(problem.matrix.rows(), 4);
+  for (float value : MapSolver(problem.matrix, problem.row_weights, problem.layout, free).solve(target, 1).texels) {
+    ASSERT_TRUE(std::isfinite(value));
+  }
+  const std::vector<float> zero_weights(problem.matrix.rows());
+  for (float value : MapSolver(problem.matrix, zero_weights, problem.layout, free).solve(target, 1).texels) {
+    ASSERT_EQ(value, 0.0F);
+  }
+}
+
+TEST(MapSolver, SolvesASinglePixelAndMapsOfOneTexel) {
+  SurfaceSamples samples = testing::mirror_sphere_samples(1, 1);
+  ASSERT_EQ(samples.size(), 1u);
+  for (int size : {1, 2, 64}) {
+    const CubePyramidLayout layout = CubePyramidLayout::full(size);
+    const RenderingMatrix a = build_rendering_matrix(samples, samples.part[0], kInfinity, layout);
+    ASSERT_EQ(a.rows(), 1u);
+    SolveOptions options;
+    options.smoothness = options.level_agreement = 1e-6F;
+    options.tolerance = 1e-6F;
+    const std::vector<float> target{2.5F};
+    const std::vector<float> weight{1.0F};
+    const MapSolution solution = MapSolver(a, weight, layout, options).solve(target, 1);
+    EXPECT_NEAR(multiply(a, solution.texels, 1)[0], 2.5F, 1e-3F) << size;
+  }
+}
+
+TEST(MapSolver, RejectsBadInputWithItsCount) {
+  const Problem problem = make_problem(16, 1, 8);
+  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
+  std::vector<float> target(problem.matrix.rows(), 1.0F);
+  target[0] = std::numeric_limits<float>::quiet_NaN();
+  target[5] = std::numeric_limits<float>::infinity();
+  try {
+    solver.solve(target, 1);
+    FAIL() << "accepted NaN";
+  } catch (const InvalidArgument& error) {
+    EXPECT_NE(std::string(error.what()).find("2 values"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(solver.solve({}, 1), InvalidArgument);
+  EXPECT_THROW(solver.solve(std::vector<float>(5 * problem.matrix.rows()), 5), InvalidArgument);
+  EXPECT_THROW(solver.solve(std::vector<float>(problem.matrix.rows()), 1, std::vector<float>(3)), InvalidArgument);
+  EXPECT_THROW(MapSolver(problem.matrix, problem.row_weights, CubePyramidLayout::full(16), {}), InvalidArgument);
+  EXPECT_THROW(MapSolver(problem.matrix, {}, problem.layout, {}), InvalidArgument);
+  SolveOptions negative;
+  negative.smoothness = -1.0F;
+  EXPECT_THROW(MapSolver(problem.matrix, problem.row_weights, problem.layout, negative), InvalidArgument);
+}
+
+TEST(MapSolver, RowWeightsFollowCoverageAndDisplayedBrightness) {
+  const Problem problem = make_problem(16, 4, 8);
+  const std::vector<float> dark(3 * problem.matrix.rows(), 0.0F);
+  const std::vector<float> bright(3 * problem.matrix.rows(), 9.0F);
+  const std::vector<float> w0 = display_row_weights(problem.matrix, 4, dark, 3);
+  const std::vector<float> w9 = display_row_weights(problem.matrix, 4, bright, 3);
+  for (std::size_t r = 0; r < w0.size(); ++r) {
+    EXPECT_EQ(w0[r], static_cast<float>(problem.matrix.row_samples[r]) / 4.0F);
+    EXPECT_NEAR(w9[r], w0[r] / 100.0F, 1e-6F);
+  }
+}
+
+}  // namespace
+}  // namespace mirrorbake

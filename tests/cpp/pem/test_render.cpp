@@ -1,0 +1,134 @@
+#include "mirrorbake/pem/render.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "mirror_sphere.hpp"
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+
+namespace mirrorbake {
+namespace {
+
+const Proxy kBox{Box{{0.1F, 0.0F, 0.2F}, {4.0F, 3.0F, 5.0F}}, {0.0F, 0.2F, 0.0F}};
+const Proxy kEllipsoid{Ellipsoid{{0.0F, 0.0F, 0.0F}, {1.5F, 1.2F, 1.3F}}, {0.0F, 0.0F, 0.0F}};
+
+// The rendering matrix and the renderer are the same linear function: for random maps, and for maps with a single
+// texel lit, which is how [PEM] §4 measures the matrix.
+TEST(Render, AgreesWithTheRenderingMatrixForRandomMaps) {
+  const SurfaceSamples samples = testing::mirror_sphere_samples(40, 5);
+  const CubePyramidLayout layout = CubePyramidLayout::full(16);
+  for (const Proxy& proxy : {kBox, kEllipsoid, Proxy{}}) {
+    std::vector<float> maps[2];
+    for (std::size_t p = 0; p < 2; ++p) maps[p] = testing::random_values(3 * layout.texels(), p);
+    const PartMaps parts[2] = {{{}, {}, proxy, maps[0]}, {{}, {}, proxy, maps[1]}};
+    const Image image = render_reflector(samples, parts, layout, {});
+    std::vector<float> expected(image.pixels.size());
+    for (int part : {0, 1}) {
+      const RenderingMatrix a = build_rendering_matrix(samples, part, proxy, layout);
+      const std::vector<float> b = multiply(a, maps[part], 3);
+      for (std::size_t r = 0; r < a.rows(); ++r) {
+        const float coverage = static_cast<float>(a.row_samples[r]) / 5.0F;
+        for (std::size_t k = 0; k < 3; ++k) expected[4 * a.row_pixels[r] + k] += coverage * b[3 * r + k];
+        expected[4 * a.row_pixels[r] + 3] += coverage;
+      }
+    }
+    // Sums of up to 5 × 8 products in another order.
+    for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(image.pixels[i], expected[i], 3e-6F) << i;
+  }
+}
+
+TEST(Render, AgreesWithEveryColumnOfTheRenderingMatrix) {
+  const SurfaceSamples samples = testing::mirror_sphere_samples(12, 2);
+  const CubePyramidLayout layout = CubePyramidLayout::full(4);
+  const RenderingMatrix matrices[2] = {build_rendering_matrix(samples, 0, kBox, layout),
+                                       build_rendering_matrix(samples, 1, kBox, layout)};
+  for (std::size_t texel = 0; texel < layout.texels(); ++texel) {
+    std::vector<float> map(3 * layout.texels());
+    map[3 * texel] = 1.0F;
+    const PartMaps part{{}, {}, kBox, map};
+    const PartMaps parts[2] = {part, part};
+    const Image image = render_reflector(samples, parts, layout, {});
+    std::vector<float> column(144);
+    for (const RenderingMatrix& a : matrices) {
+      for (std::size_t r = 0; r < a.rows(); ++r) {
+        for (std::uint64_t e = a.row_offsets[r]; e < a.row_offsets[r + 1]; ++e) {
+          if (a.texels[e] != texel) continue;
+          column[a.row_pixels[r]] += a.weights[e] * static_cast<float>(a.row_samples[r]) / 2.0F;
+        }
+      }
+    }
+    for (std::size_t i = 0; i < column.size(); ++i) ASSERT_NEAR(image.pixels[4 * i], column[i], 1e-6F);
+  }
+}
+
+TEST(Render, CompositesLocalOverDistantTimesFresnelPlusDiffuse) {
+  SurfaceSamples samples = testing::mirror_sphere_samples(20, 3);
+  const CubePyramidLayout layout = CubePyramidLayout::full(4);
+  for (glm::vec3& f : samples.fresnel) f = {0.2F, 0.5F, 0.8F};
+  std::vector<float> local, distant;
+  for (std::size_t i = 0; i < layout.texels(); ++i) {
+    local.insert(local.end(), {0.1F, 0.2F, 0.3F, 0.25F});
+    distant.insert(distant.end(), {4.0F, 2.0F, 1.0F});
+  }
+  const std::vector<glm::vec3> diffuse(samples.size(), glm::vec3(0.01F, 0.02F, 0.03F));
+  const PartMaps part{kEllipsoid, local, kBox, distant};
+  const PartMaps parts[2] = {part, part};
+  const Image image = render_reflector(samples, parts, layout, diffuse);
+  const float expected[3] = {(0.1F + 0.75F * 4.0F) * 0.2F + 0.01F, (0.2F + 0.75F * 2.0F) * 0.5F + 0.02F,
+                             (0.3F + 0.75F * 1.0F) * 0.8F + 0.03F};
+  int covered = 0;
+  for (std::size_t i = 0; i < 400; ++i) {
+    const float coverage = image.pixels[4 * i + 3];
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(image.pixels[4 * i + k], coverage * expected[k], 1e-5F);
+    covered += coverage > 0.0F;
+  }
+  EXPECT_GT(covered, 300);
+}
+
+TEST(Render, SameBitsOnOneThread) {
+  const SurfaceSamples samples = testing::mirror_sphere_samples(64, 4);
+  const CubePyramidLayout layout = CubePyramidLayout::full(32);
+  const std::vector<float> map = testing::random_values(3 * layout.texels(), 9);
+  const PartMaps part{{}, {}, kBox, map};
+  const PartMaps parts[2] = {part, part};
+  const Image all = render_reflector(samples, parts, layout, {});
+  const ThreadLimit limit(1);
+  EXPECT_EQ(all.pixels, render_reflector(samples, parts, layout, {}).pixels);
+}
+
+TEST(Render, RejectsMapsThatDoNotFit) {
+  const SurfaceSamples samples = testing::mirror_sphere_samples(8, 1);
+  const CubePyramidLayout layout = CubePyramidLayout::full(4);
+  const std::vector<float> map(3 * layout.texels());
+  const std::vector<float> small(3 * layout.texels() - 3);
+  const PartMaps good{{}, {}, kBox, map};
+  const PartMaps bad{{}, {}, kBox, small};
+  const PartMaps with_bad[2] = {good, bad};
+  EXPECT_THROW(render_reflector(samples, with_bad, layout, {}), InvalidArgument);
+  EXPECT_THROW(render_reflector(samples, {&good, 1}, layout, {}), InvalidArgument);
+  const PartMaps parts[2] = {good, good};
+  const std::vector<glm::vec3> diffuse(3);
+  EXPECT_THROW(render_reflector(samples, parts, layout, diffuse), InvalidArgument);
+}
+
+TEST(Render, DiffuseIsAlbedoTimesInterpolatedIrradianceOverPi) {
+  SurfaceSamples samples = testing::mirror_sphere_samples(8, 1);
+  for (glm::vec3& albedo : samples.albedo) albedo = {0.5F, 0.25F, 1.0F};
+  const glm::uvec3 triangles[1] = {{0, 1, 2}};
+  const glm::vec3 irradiance[3] = {glm::vec3(1.0F), glm::vec3(2.0F), glm::vec3(5.0F)};
+  // Barycentrics (¼, ¼): ½·1 + ¼·2 + ¼·5.
+  const float mean = 2.25F / std::numbers::pi_v<float>;
+  for (const glm::vec3& d : diffuse_from_irradiance(samples, triangles, irradiance)) {
+    EXPECT_NEAR(d.x, 0.5F * mean, 1e-6F);
+    EXPECT_NEAR(d.y, 0.25F * mean, 1e-6F);
+    EXPECT_NEAR(d.z, mean, 1e-6F);
+  }
+  const glm::uvec3 out_of_range[1] = {{0, 1, 3}};
+  EXPECT_THROW(diffuse_from_irradiance(samples, out_of_range, irradiance), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace mirrorbake

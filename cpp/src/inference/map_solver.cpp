@@ -42,14 +42,6 @@ void check(const SolveOptions& options) {
   }
 }
 
-ChannelSums dot(const Vector& a, const Vector& b) {
-  return parallel_channel_sums(a.size(), [&](std::size_t begin, std::size_t end) {
-    ChannelSums sums{};
-    for (std::size_t i = begin; i < end; ++i) add_product(sums, a[i], b[i]);
-    return sums;
-  });
-}
-
 Channels to_channels(const ChannelSums& sums) {
   Channels c{};
   for (std::size_t k = 0; k < 4; ++k) c[k] = static_cast<float>(sums[k]);

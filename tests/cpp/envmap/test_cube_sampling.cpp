@@ -49,6 +49,53 @@ TEST(CubeSampling, WeightsSumToOneOnEveryLevel) {
   }
 }
 
+// The texel across an edge is the one whose centre is nearest among those outside of the face, and crossing back returns.
+TEST(CubeSampling, TexelsAcrossEdgesAreTheNearestAndMutual) {
+  for (int n : {1, 2, 3, 8}) {
+    const CubePyramidLayout layout{n, 1};
+    std::vector<glm::vec3> centres(layout.texels());
+    const float scale = 1.0F / static_cast<float>(n);
+    const auto centre = [&](int face, int row, int column) {
+      return glm::normalize(direction_from_cube(face, (static_cast<float>(column) + 0.5F) * scale,
+                                                (static_cast<float>(row) + 0.5F) * scale));
+    };
+    for (int face = 0; face < 6; ++face) {
+      for (int row = 0; row < n; ++row) {
+        for (int column = 0; column < n; ++column) {
+          centres[layout.index(0, face, row, column)] = centre(face, row, column);
+        }
+      }
+    }
+    const std::size_t face_texels = static_cast<std::size_t>(n * n);
+    for (int face = 0; face < 6; ++face) {
+      for (int i = 0; i < n; ++i) {
+        const int inside[4][2] = {{0, i}, {n - 1, i}, {i, 0}, {i, n - 1}};
+        const int outside[4][2] = {{-1, i}, {n, i}, {i, -1}, {i, n}};
+        for (int edge = 0; edge < 4; ++edge) {
+          const std::size_t from = layout.index(0, face, inside[edge][0], inside[edge][1]);
+          const std::size_t to = cube_texel_across_edges(layout, 0, face, outside[edge][0], outside[edge][1]);
+          ASSERT_NE(to / face_texels, from / face_texels);
+          float nearest = -1.0F;
+          for (std::size_t t = 0; t < centres.size(); ++t) {
+            if (t / face_texels != from / face_texels) nearest = std::max(nearest, glm::dot(centres[t], centres[from]));
+          }
+          // A corner texel has two equally near ones, one across each edge.
+          EXPECT_NEAR(glm::dot(centres[to], centres[from]), nearest, 1e-6F);
+          const int other = static_cast<int>(to / face_texels);
+          const int row = static_cast<int>(to % face_texels) / n;
+          const int column = static_cast<int>(to % face_texels) % n;
+          int back = 0;
+          for (const auto& [dr, dc] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+            const bool leaves = row + dr < 0 || row + dr >= n || column + dc < 0 || column + dc >= n;
+            back += leaves && cube_texel_across_edges(layout, 0, other, row + dr, column + dc) == from;
+          }
+          EXPECT_EQ(back, 1);
+        }
+      }
+    }
+  }
+}
+
 // Along a great circle the filtered map has no step: a bilinear, seamless lookup is continuous, so over a step of
 // angle h it changes by at most (texels per radian, at most n at a face's centre... n/2·2) · h · range, here 64 h.
 TEST(CubeSampling, LookupIsContinuousAcrossEdgesAndCorners) {

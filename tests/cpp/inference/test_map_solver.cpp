@@ -143,22 +143,21 @@ TEST(MapSolver, ReproducesATargetThatAMapCanMake) {
   const std::vector<float> truth = testing::random_values(4 * problem.layout.texels(), 1);
   const std::vector<float> target = multiply(problem.matrix, truth, 4);
   const MapSolution solution = MapSolver(problem.matrix, problem.row_weights, problem.layout, options).solve(target, 4);
-  EXPECT_LT(solution.report.rms_error, 1e-3);
+  // What is left is the pull of the smoothness on a map of white noise; the noise itself is 0.29.
+  EXPECT_LT(solution.report.rms_error, 5e-3);
 }
 
-// Scaling the light scales the solution: nothing in the solver has a unit.
+// Scaling the light scales the solution: nothing in the solver has a unit. A power of two changes no rounding.
 TEST(MapSolver, IsLinearOverTenOrdersOfRadiance) {
   const Problem problem = make_problem(32, 4, 16);
   const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
   const std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);
   const MapSolution unit = solver.solve(target, 1);
-  for (float scale : {1e-4F, 1e6F}) {
+  for (float scale : {0x1p-14F, 0x1p20F}) {
     std::vector<float> scaled = target;
     for (float& value : scaled) value *= scale;
     const MapSolution solution = solver.solve(scaled, 1);
-    for (std::size_t i = 0; i < solution.texels.size(); ++i) {
-      ASSERT_NEAR(solution.texels[i] / scale, unit.texels[i], 1e-4F);
-    }
+    for (std::size_t i = 0; i < solution.texels.size(); ++i) ASSERT_EQ(solution.texels[i], scale * unit.texels[i]);
   }
 }
 
@@ -195,12 +194,13 @@ TEST(MapSolver, FallsBackToThePriorWhereNothingIsSeen) {
   // A target that the prior explains leaves it as it is, seen or not.
   const MapSolution same = solver.solve(multiply(problem.matrix, prior, 1), 1, prior);
   for (std::size_t i = 0; i < prior.size(); ++i) ASSERT_NEAR(same.texels[i], prior[i], 1e-5F);
-  // Whatever the target, the direction that no sample of this part reflects keeps the prior's value: straight down,
-  // which only the lower half of the sphere, part 1, sees.
+  // Straight up is seen by this part, the upper half of the sphere; straight down is a quarter circle away from all
+  // that it sees. The one follows the target, the other stays near the prior.
   const MapSolution other = solver.solve(std::vector<float>(problem.matrix.rows(), 5.0F), 1, prior);
+  const std::size_t up = problem.layout.index(0, 2, 8, 8);
   const std::size_t down = problem.layout.index(0, 3, 8, 8);
-  EXPECT_NEAR(other.texels[down], prior[down], 0.6F);
-  EXPECT_LT(std::abs(other.texels[down] - prior[down]), 0.2F * (5.0F - prior[down]));
+  EXPECT_LT(std::abs(other.texels[up] - 5.0F), 0.3F * (5.0F - prior[up]));
+  EXPECT_LT(std::abs(other.texels[down] - prior[down]), 0.3F * (5.0F - prior[down]));
 }
 
 TEST(MapSolver, ClampsToRadianceAndCoverage) {

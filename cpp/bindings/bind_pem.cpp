@@ -20,20 +20,22 @@ struct OwnedPartMaps {
 
 void bind_pem(nb::module_& m) {
   nb::class_<OwnedPartMaps>(m, "PartMaps", "Environment maps of one part of the reflector.")
-      .def("__init__",
-           [](OwnedPartMaps* self, const Proxy& distant_proxy, FloatMatrix distant, const Proxy& local_proxy,
-              std::optional<FloatMatrix> local) {
-             new (self) OwnedPartMaps{local_proxy, std::move(local), distant_proxy, std::move(distant)};
-           },
-           nb::arg("distant_proxy"), nb::arg("distant"), nb::arg("local_proxy") = Proxy{},
-           nb::arg("local") = nb::none(),
-           "distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part without "
-           "a local layer.");
+      .def(
+          "__init__",
+          [](OwnedPartMaps* self, const Proxy& distant_proxy, FloatMatrix distant, const Proxy& local_proxy,
+             std::optional<FloatMatrix> local) {
+            new (self) OwnedPartMaps{local_proxy, std::move(local), distant_proxy, std::move(distant)};
+          },
+          nb::arg("distant_proxy"), nb::arg("distant"), nb::arg("local_proxy") = Proxy{},
+          nb::arg("local") = nb::none(),
+          "distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part "
+          "without "
+          "a local layer.");
 
   m.def(
       "render_reflector",
-      [](const SurfaceSamples& samples, const std::vector<const OwnedPartMaps*>& parts, const CubePyramidLayout& layout,
-         std::optional<PointArray> diffuse, const LookupOptions& options) {
+      [](const SurfaceSamples& samples, const std::vector<const OwnedPartMaps*>& parts,
+         const CubePyramidLayout& layout, std::optional<PointArray> diffuse, const LookupOptions& options) {
         std::vector<PartMaps> views;
         for (const OwnedPartMaps* part : parts) {
           PartMaps view;
@@ -55,13 +57,16 @@ void bind_pem(nb::module_& m) {
       },
       nb::arg("samples"), nb::arg("parts"), nb::arg("layout"), nb::arg("diffuse") = nb::none(),
       nb::arg("options") = LookupOptions{},
-      "Draws the reflector from its maps: (L_local + (1 - alpha) L_distant) F + D per sample, averaged over the pixel.\n\n"
-      "diffuse: float32 (len(samples), 3) or None for black. Returns float32 (H, W, 4): light times coverage, and "
+      "Draws the reflector from its maps: (L_local + (1 - alpha) L_distant) F + D per sample, averaged over "
+      "the pixel.\n\n"
+      "diffuse: float32 (len(samples), 3) or None for black. Returns float32 (H, W, 4): light times "
+      "coverage, and "
       "coverage.");
 
   m.def(
       "diffuse_from_irradiance",
-      [](const SurfaceSamples& samples, nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu> triangles,
+      [](const SurfaceSamples& samples,
+         nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu> triangles,
          PointArray irradiance) {
         std::vector<glm::vec3> diffuse;
         {
@@ -73,7 +78,8 @@ void bind_pem(nb::module_& m) {
         return vectors_to_numpy(std::move(diffuse));
       },
       nb::arg("samples"), nb::arg("triangles"), nb::arg("vertex_irradiance"),
-      "Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex (V, 3).");
+      "Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex (V, "
+      "3).");
 }
 
 }  // namespace mirrorbake::bindings

@@ -38,7 +38,8 @@ std::size_t CubePyramidLayout::level_offset(int level) const {
   return offset;
 }
 
-std::vector<float> build_cube_pyramid(std::span<const float> faces, const CubePyramidLayout& layout, int channels) {
+std::vector<float> build_cube_pyramid(std::span<const float> faces, const CubePyramidLayout& layout,
+                                      int channels) {
   const std::size_t c = static_cast<std::size_t>(channels);
   if (channels < 1 || faces.size() != layout.level_texels(0) * c) {
     throw InvalidArgument("faces", std::to_string(faces.size()) + " values",

@@ -9,7 +9,8 @@
 
 namespace mirrorbake {
 
-std::uint32_t cube_texel_across_edges(const CubePyramidLayout& layout, int level, int face, int row, int column) {
+std::uint32_t cube_texel_across_edges(const CubePyramidLayout& layout, int level, int face, int row,
+                                      int column) {
   const int n = layout.level_size(level);
   if (row >= 0 && row < n && column >= 0 && column < n) {
     return static_cast<std::uint32_t>(layout.index(level, face, row, column));
@@ -69,7 +70,8 @@ void add_bilinear(const CubePyramidLayout& layout, int level, glm::vec3 directio
   }
 }
 
-float cube_level_of_detail(const CubePyramidLayout& layout, glm::vec3 direction, glm::vec3 ddx, glm::vec3 ddy) {
+float cube_level_of_detail(const CubePyramidLayout& layout, glm::vec3 direction, glm::vec3 ddx,
+                           glm::vec3 ddy) {
   const glm::vec3 a = glm::abs(direction);
   int axis = 0;
   if (a.y > a.x) axis = 1;
@@ -91,7 +93,8 @@ float cube_level_of_detail(const CubePyramidLayout& layout, glm::vec3 direction,
   return std::min(0.5F * std::log2(rho2), coarsest);
 }
 
-CubeFootprint trilinear_footprint(const CubePyramidLayout& layout, glm::vec3 direction, float level_of_detail) {
+CubeFootprint trilinear_footprint(const CubePyramidLayout& layout, glm::vec3 direction,
+                                  float level_of_detail) {
   const float clamped = std::clamp(level_of_detail, 0.0F, static_cast<float>(layout.levels - 1));
   const int level = static_cast<int>(clamped);
   const float fraction = clamped - static_cast<float>(level);

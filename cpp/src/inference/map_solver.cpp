@@ -20,7 +20,8 @@ constexpr std::size_t kRowGrain = 2048;
 
 void check_finite(const char* name, std::span<const float> values) {
   const auto bad = std::count_if(values.begin(), values.end(), [](float v) { return !std::isfinite(v); });
-  if (bad > 0) throw InvalidArgument(name, "not finite in " + std::to_string(bad) + " values", "finite numbers");
+  if (bad > 0)
+    throw InvalidArgument(name, "not finite in " + std::to_string(bad) + " values", "finite numbers");
 }
 
 void check_length(const char* name, std::size_t length, std::size_t expected) {
@@ -31,12 +32,14 @@ void check_length(const char* name, std::size_t length, std::size_t expected) {
 
 void check(const SolveOptions& options) {
   const auto check_weight = [](const char* name, float value) {
-    if (!(value >= 0.0F && std::isfinite(value))) throw InvalidArgument(name, std::to_string(value), "a number ≥ 0");
+    if (!(value >= 0.0F && std::isfinite(value)))
+      throw InvalidArgument(name, std::to_string(value), "a number ≥ 0");
   };
   check_weight("smoothness", options.smoothness);
   check_weight("level_agreement", options.level_agreement);
   check_weight("prior_weight", options.prior_weight);
-  if (!(options.tolerance > 0.0F)) throw InvalidArgument("tolerance", std::to_string(options.tolerance), "a number > 0");
+  if (!(options.tolerance > 0.0F))
+    throw InvalidArgument("tolerance", std::to_string(options.tolerance), "a number > 0");
   if (options.max_iterations < 0 || options.max_iterations > 100000) {
     throw InvalidArgument("max_iterations", std::to_string(options.max_iterations), "0 to 100000");
   }
@@ -52,7 +55,8 @@ Channels to_channels(const ChannelSums& sums) {
 
 std::vector<float> display_row_weights(const RenderingMatrix& matrix, int samples_per_pixel,
                                        std::span<const float> target, int channels) {
-  if (samples_per_pixel < 1) throw InvalidArgument("samples_per_pixel", std::to_string(samples_per_pixel), "at least 1");
+  if (samples_per_pixel < 1)
+    throw InvalidArgument("samples_per_pixel", std::to_string(samples_per_pixel), "at least 1");
   const std::size_t c = static_cast<std::size_t>(channels);
   check_length("target", target.size(), matrix.rows() * c);
   std::vector<float> weights(matrix.rows());
@@ -80,10 +84,10 @@ struct MapSolver::State {
   std::vector<std::uint32_t> rows;
   std::vector<float> weighted;
 
-  std::vector<std::uint32_t> texels;   // of each unknown
-  std::vector<std::uint8_t> seen;      // of each texel
-  std::vector<float> column_weight;    // AᵀW 1
-  std::vector<float> data_diagonal;    // of AᵀW A
+  std::vector<std::uint32_t> texels;  // of each unknown
+  std::vector<std::uint8_t> seen;     // of each texel
+  std::vector<float> column_weight;   // AᵀW 1
+  std::vector<float> data_diagonal;   // of AᵀW A
   Regulariser regulariser;
 
   std::size_t unknowns() const { return texels.size(); }
@@ -92,7 +96,8 @@ struct MapSolver::State {
     parallel_for(row_weights.size(), kRowGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = begin; r < end; ++r) {
         Channels sum{};
-        for (std::uint64_t e = row_offsets[r]; e < row_offsets[r + 1]; ++e) sum += broadcast(weights[e]) * x[columns[e]];
+        for (std::uint64_t e = row_offsets[r]; e < row_offsets[r + 1]; ++e)
+          sum += broadcast(weights[e]) * x[columns[e]];
         b[r] = sum;
       }
     });
@@ -147,7 +152,8 @@ MapSolver::MapSolver(const RenderingMatrix& matrix, std::span<const float> row_w
   const auto bad = std::count_if(row_weights.begin(), row_weights.end(),
                                  [](float w) { return !(w >= 0.0F && std::isfinite(w)); });
   if (bad > 0) {
-    throw InvalidArgument("row_weights", "negative or not finite in " + std::to_string(bad) + " values", "numbers ≥ 0");
+    throw InvalidArgument("row_weights", "negative or not finite in " + std::to_string(bad) + " values",
+                          "numbers ≥ 0");
   }
 
   auto [texels, number_of] = number_seen(matrix);
@@ -338,7 +344,8 @@ MapSolution MapSolver::solve(std::span<const float> target, int channels, std::s
   for (std::size_t r = 0; r < m; ++r) {
     const Channels error = rendered[r] - wanted[r];
     for (std::size_t k = 0; k < c; ++k) {
-      squares += static_cast<double>(s.row_weights[r]) * static_cast<double>(error[k]) * static_cast<double>(error[k]);
+      squares += static_cast<double>(s.row_weights[r]) * static_cast<double>(error[k]) *
+                 static_cast<double>(error[k]);
     }
     weight += static_cast<double>(s.row_weights[r]) * static_cast<double>(channels);
   }

@@ -16,15 +16,16 @@ void for_each_texel(const CubePyramidLayout& layout, int level, const Body& body
     for (std::size_t line = begin; line < end; ++line) {
       const int face = static_cast<int>(line) / n;
       const int row = static_cast<int>(line) % n;
-      for (int column = 0; column < n; ++column) body(face, row, column, layout.index(level, face, row, column));
+      for (int column = 0; column < n; ++column)
+        body(face, row, column, layout.index(level, face, row, column));
     }
   });
 }
 
 }  // namespace
 
-void fill_unknown(const CubePyramidLayout& layout, const std::vector<std::uint8_t>& known, FillTowards towards,
-                  std::vector<Channels>& texels) {
+void fill_unknown(const CubePyramidLayout& layout, const std::vector<std::uint8_t>& known,
+                  FillTowards towards, std::vector<Channels>& texels) {
   std::vector<std::uint8_t> filled = known;
   for (int level = 1; level < layout.levels; ++level) {
     for_each_texel(layout, level, [&](int face, int row, int column, std::size_t i) {
@@ -54,7 +55,8 @@ void fill_unknown(const CubePyramidLayout& layout, const std::vector<std::uint8_
   }
   for (std::size_t i = first; i < layout.texels(); ++i) {
     if (filled[i]) continue;
-    texels[i] = count == 0 || towards == FillTowards::zero ? Channels{} : sum / broadcast(static_cast<float>(count));
+    texels[i] =
+        count == 0 || towards == FillTowards::zero ? Channels{} : sum / broadcast(static_cast<float>(count));
     filled[i] = 1;
   }
 
@@ -84,10 +86,11 @@ void fill_unknown(const CubePyramidLayout& layout, const std::vector<std::uint8_
           relaxed[i - offset] = texels[i];
           return;
         }
-        relaxed[i - offset] = broadcast(0.25F) * (texels[cube_texel_across_edges(layout, level, face, row - 1, column)] +
-                                                  texels[cube_texel_across_edges(layout, level, face, row + 1, column)] +
-                                                  texels[cube_texel_across_edges(layout, level, face, row, column - 1)] +
-                                                  texels[cube_texel_across_edges(layout, level, face, row, column + 1)]);
+        relaxed[i - offset] =
+            broadcast(0.25F) * (texels[cube_texel_across_edges(layout, level, face, row - 1, column)] +
+                                texels[cube_texel_across_edges(layout, level, face, row + 1, column)] +
+                                texels[cube_texel_across_edges(layout, level, face, row, column - 1)] +
+                                texels[cube_texel_across_edges(layout, level, face, row, column + 1)]);
       });
       std::copy(relaxed.begin(), relaxed.end(), texels.begin() + static_cast<std::ptrdiff_t>(offset));
     }

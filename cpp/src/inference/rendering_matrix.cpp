@@ -85,7 +85,8 @@ RenderingMatrix build_rendering_matrix(const SurfaceSamples& samples, int part, 
   check_lengths(samples);
   validate(proxy);
   if (!(options.footprint_scale > 0.0F) || options.footprint_scale > 1024.0F) {
-    throw InvalidArgument("footprint_scale", std::to_string(options.footprint_scale), "a number in (0, 1024]");
+    throw InvalidArgument("footprint_scale", std::to_string(options.footprint_scale),
+                          "a number in (0, 1024]");
   }
   const RowSamples groups = group_by_pixel(samples, part);
   const std::size_t rows = groups.offsets.size() - 1;
@@ -157,7 +158,8 @@ std::vector<float> average_over_rows(const RenderingMatrix& matrix, const Surfac
         for (std::size_t m = groups.offsets[r]; m < groups.offsets[r + 1]; ++m) {
           sum += static_cast<double>(values[groups.members[m] * c + k]);
         }
-        target[r * c + k] = static_cast<float>(sum / static_cast<double>(groups.offsets[r + 1] - groups.offsets[r]));
+        target[r * c + k] =
+            static_cast<float>(sum / static_cast<double>(groups.offsets[r + 1] - groups.offsets[r]));
       }
     }
   });

@@ -21,9 +21,8 @@ inline Channels broadcast(float value) { return Channels{value, value, value, va
 template <typename Body>
 ChannelSums parallel_channel_sums(std::size_t count, const Body& body) {
   std::vector<ChannelSums> partial((count + kVectorGrain - 1) / kVectorGrain);
-  parallel_for(count, kVectorGrain, [&](std::size_t begin, std::size_t end) {
-    partial[begin / kVectorGrain] = body(begin, end);
-  });
+  parallel_for(count, kVectorGrain,
+               [&](std::size_t begin, std::size_t end) { partial[begin / kVectorGrain] = body(begin, end); });
   ChannelSums sums{};
   for (const ChannelSums& part : partial) {
     for (std::size_t k = 0; k < 4; ++k) sums[k] += part[k];

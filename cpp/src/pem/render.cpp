@@ -33,7 +33,8 @@ glm::vec3 read_distant(std::span<const float> map, const CubeFootprint& footprin
 }
 
 void check_length(const std::string& name, std::size_t length, std::size_t expected) {
-  if (length != expected) throw InvalidArgument(name, std::to_string(length) + " entries", std::to_string(expected));
+  if (length != expected)
+    throw InvalidArgument(name, std::to_string(length) + " entries", std::to_string(expected));
 }
 
 }  // namespace
@@ -61,15 +62,16 @@ Image render_reflector(const SurfaceSamples& samples, std::span<const PartMaps> 
 
   // Where each pixel's samples start: pixels are independent of each other, samples are in their order.
   Image image(samples.width, samples.height, {"R", "G", "B", "A"});
-  const std::size_t pixels = static_cast<std::size_t>(samples.width) * static_cast<std::size_t>(samples.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(samples.width) * static_cast<std::size_t>(samples.height);
   parallel_for(pixels, kPixelsPerChunk, [&](std::size_t begin, std::size_t end) {
     const auto first = std::lower_bound(samples.pixel.begin(), samples.pixel.end(), begin);
     const float mean = 1.0F / static_cast<float>(samples.samples_per_pixel);
     for (std::size_t i = static_cast<std::size_t>(first - samples.pixel.begin());
          i < samples.size() && samples.pixel[i] < end; ++i) {
       const PartMaps& maps = parts[samples.part[i]];
-      glm::vec3 light = read_distant(
-          maps.distant, lookup_footprint(samples, i, maps.distant_proxy, layout, options));
+      glm::vec3 light =
+          read_distant(maps.distant, lookup_footprint(samples, i, maps.distant_proxy, layout, options));
       if (!maps.local.empty()) {
         const glm::vec4 local =
             read_local(maps.local, lookup_footprint(samples, i, maps.local_proxy, layout, options));
@@ -85,7 +87,8 @@ Image render_reflector(const SurfaceSamples& samples, std::span<const PartMaps> 
   return image;
 }
 
-std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples, std::span<const glm::uvec3> triangles,
+std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
+                                               std::span<const glm::uvec3> triangles,
                                                std::span<const glm::vec3> vertex_irradiance) {
   for (const glm::uvec3& triangle : triangles) {
     if (std::max({triangle.x, triangle.y, triangle.z}) >= vertex_irradiance.size()) {

@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 #include <set>
+#include <Eigen/Dense>
 
 #include "mirror_sphere.hpp"
 #include "mirrorbake/core/error.hpp"
@@ -119,14 +119,16 @@ TEST(MapSolver, AgreesWithADenseSolve) {
     for (int k = 0; k < 3; ++k) {
       Eigen::VectorXd b(a.rows());
       Eigen::VectorXd base = Eigen::VectorXd::Zero(a.cols());
-      for (Eigen::Index r = 0; r < b.size(); ++r) b(r) = static_cast<double>(target[static_cast<std::size_t>(3 * r + k)]);
+      for (Eigen::Index r = 0; r < b.size(); ++r)
+        b(r) = static_cast<double>(target[static_cast<std::size_t>(3 * r + k)]);
       for (Eigen::Index i = 0; with_prior && i < base.size(); ++i) {
         base(i) = static_cast<double>(prior[static_cast<std::size_t>(3 * i + k)]);
       }
       const Eigen::VectorXd x = base + normal.ldlt().solve(a.transpose() * (w.asDiagonal() * (b - a * base)));
       for (std::uint32_t i : seen) {
         // The gradient is reduced to 1e-7 of its start; the smallest curvature of this problem is about 1e-2.
-        EXPECT_NEAR(static_cast<double>(solution.texels[3 * i + static_cast<std::size_t>(k)]), std::max(x(i), 0.0), 2e-4)
+        EXPECT_NEAR(static_cast<double>(solution.texels[3 * i + static_cast<std::size_t>(k)]),
+                    std::max(x(i), 0.0), 2e-4)
             << "prior " << with_prior << ", texel " << i << ", channel " << k;
       }
     }
@@ -142,7 +144,8 @@ TEST(MapSolver, ReproducesATargetThatAMapCanMake) {
   options.max_iterations = 3000;
   const std::vector<float> truth = testing::random_values(4 * problem.layout.texels(), 1);
   const std::vector<float> target = multiply(problem.matrix, truth, 4);
-  const MapSolution solution = MapSolver(problem.matrix, problem.row_weights, problem.layout, options).solve(target, 4);
+  const MapSolution solution =
+      MapSolver(problem.matrix, problem.row_weights, problem.layout, options).solve(target, 4);
   // What is left is the pull of the smoothness on a map of white noise; the noise itself is 0.29.
   EXPECT_LT(solution.report.rms_error, 5e-3);
 }
@@ -157,7 +160,8 @@ TEST(MapSolver, IsLinearOverTenOrdersOfRadiance) {
     std::vector<float> scaled = target;
     for (float& value : scaled) value *= scale;
     const MapSolution solution = solver.solve(scaled, 1);
-    for (std::size_t i = 0; i < solution.texels.size(); ++i) ASSERT_EQ(solution.texels[i], scale * unit.texels[i]);
+    for (std::size_t i = 0; i < solution.texels.size(); ++i)
+      ASSERT_EQ(solution.texels[i], scale * unit.texels[i]);
   }
 }
 
@@ -165,14 +169,17 @@ TEST(MapSolver, SolvesATargetThatSpansTenOrdersOfRadiance) {
   const Problem problem = make_problem(32, 4, 16);
   std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);
   for (float& value : target) value = std::pow(10.0F, 10.0F * value - 4.0F);
-  const MapSolution solution = MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 1);
+  const MapSolution solution =
+      MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 1);
   for (float value : solution.texels) ASSERT_TRUE(std::isfinite(value) && value >= 0.0F);
 }
 
 TEST(MapSolver, SameBitsOnOneThread) {
   const Problem problem = make_problem(96, 4, 64);
   const std::vector<float> target = testing::random_values(3 * problem.matrix.rows(), 5);
-  const auto solve = [&] { return MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 3); };
+  const auto solve = [&] {
+    return MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 3);
+  };
   const MapSolution all = solve();
   const ThreadLimit limit(1);
   const MapSolution one = solve();
@@ -183,7 +190,8 @@ TEST(MapSolver, SameBitsOnOneThread) {
 TEST(MapSolver, FillsUnseenTexelsBetweenTheSeenOnes) {
   const Problem problem = make_problem(24, 4, 16);
   const std::vector<float> target(problem.matrix.rows(), 0.7F);
-  const MapSolution solution = MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 1);
+  const MapSolution solution =
+      MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 1);
   for (float value : solution.texels) ASSERT_NEAR(value, 0.7F, 1e-5F);
 }
 
@@ -228,7 +236,8 @@ TEST(MapSolver, AnswersWithoutRowsWithoutWeightsAndWithoutARegulariser) {
   free.smoothness = free.level_agreement = free.prior_weight = 0.0F;
   const Problem problem = make_problem(16, 1, 16);
   const std::vector<float> target = testing::random_values(problem.matrix.rows(), 4);
-  for (float value : MapSolver(problem.matrix, problem.row_weights, problem.layout, free).solve(target, 1).texels) {
+  for (float value :
+       MapSolver(problem.matrix, problem.row_weights, problem.layout, free).solve(target, 1).texels) {
     ASSERT_TRUE(std::isfinite(value));
   }
   const std::vector<float> zero_weights(problem.matrix.rows());
@@ -268,8 +277,10 @@ TEST(MapSolver, RejectsBadInputWithItsCount) {
   }
   EXPECT_THROW(solver.solve({}, 1), InvalidArgument);
   EXPECT_THROW(solver.solve(std::vector<float>(5 * problem.matrix.rows()), 5), InvalidArgument);
-  EXPECT_THROW(solver.solve(std::vector<float>(problem.matrix.rows()), 1, std::vector<float>(3)), InvalidArgument);
-  EXPECT_THROW(MapSolver(problem.matrix, problem.row_weights, CubePyramidLayout::full(16), {}), InvalidArgument);
+  EXPECT_THROW(solver.solve(std::vector<float>(problem.matrix.rows()), 1, std::vector<float>(3)),
+               InvalidArgument);
+  EXPECT_THROW(MapSolver(problem.matrix, problem.row_weights, CubePyramidLayout::full(16), {}),
+               InvalidArgument);
   EXPECT_THROW(MapSolver(problem.matrix, {}, problem.layout, {}), InvalidArgument);
   SolveOptions negative;
   negative.smoothness = -1.0F;

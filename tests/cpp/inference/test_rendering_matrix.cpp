@@ -81,7 +81,8 @@ TEST(RenderingMatrix, RejectsArraysOfDifferentLengths) {
 TEST(RenderingMatrix, RejectsFootprintsOutOfRange) {
   const SurfaceSamples samples = testing::mirror_sphere_samples(16, 1);
   for (float scale : {0.0F, -1.0F, 1e6F, std::nanf("")}) {
-    EXPECT_THROW(build_rendering_matrix(samples, 0, kBox, CubePyramidLayout::full(8), {scale}), InvalidArgument);
+    EXPECT_THROW(build_rendering_matrix(samples, 0, kBox, CubePyramidLayout::full(8), {scale}),
+                 InvalidArgument);
   }
 }
 

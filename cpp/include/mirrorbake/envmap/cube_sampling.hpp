@@ -24,7 +24,8 @@ struct CubeFootprint {
 
 /// Index of the texel at (row, column) of a face, where at most one of the two may lie one outside of the face: the
 /// neighbouring face's texel across that edge.
-std::uint32_t cube_texel_across_edges(const CubePyramidLayout& layout, int level, int face, int row, int column);
+std::uint32_t cube_texel_across_edges(const CubePyramidLayout& layout, int level, int face, int row,
+                                      int column);
 
 /// Four texels of `level` around `direction`, bilinear and seamless: beyond the edge of a face lie the texels of
 /// its neighbour, and at a corner, where only three texels meet, the fourth is their mean, as in OpenGL
@@ -35,9 +36,11 @@ void add_bilinear(const CubePyramidLayout& layout, int level, glm::vec3 directio
 /// Level of detail of a lookup in `direction` whose differentials over a pixel are `ddx` and `ddy`, as graphics
 /// hardware computes it (OpenGL 4.6 §8.14): log2 of the longer of the two differentials in texels of the finest
 /// level, clamped to the levels that exist. `direction` may have any length > 0.
-float cube_level_of_detail(const CubePyramidLayout& layout, glm::vec3 direction, glm::vec3 ddx, glm::vec3 ddy);
+float cube_level_of_detail(const CubePyramidLayout& layout, glm::vec3 direction, glm::vec3 ddx,
+                           glm::vec3 ddy);
 
 /// Trilinear footprint: bilinear on the two levels next to `level_of_detail`, in proportion.
-CubeFootprint trilinear_footprint(const CubePyramidLayout& layout, glm::vec3 direction, float level_of_detail);
+CubeFootprint trilinear_footprint(const CubePyramidLayout& layout, glm::vec3 direction,
+                                  float level_of_detail);
 
 }  // namespace mirrorbake

@@ -13,7 +13,7 @@ namespace mirrorbake {
 
 /// Weights of the regulariser are relative to a row of weight 1, which is a fully covered pixel of dark radiance.
 struct SolveOptions {
-  float smoothness = 1e-3F;       ///< λ of squared differences between neighbouring texels of one level, ≥ 0
+  float smoothness = 1e-3F;  ///< λ of squared differences between neighbouring texels of one level, ≥ 0
   float level_agreement = 1e-3F;  ///< λ of a texel's squared difference from the mean of its children, ≥ 0
   float prior_weight = 1e-2F;     ///< λ of the squared difference from the prior, where one is given, ≥ 0
   float tolerance = 1e-3F;        ///< stop when the preconditioned gradient has shrunk to this fraction, > 0
@@ -47,8 +47,8 @@ class MapSolver {
  public:
   /// Throws InvalidArgument if the layout is not the matrix's, its size is not a power of two, or an option or weight is
   /// out of range.
-  MapSolver(const RenderingMatrix& matrix, std::span<const float> row_weights, const CubePyramidLayout& layout,
-            const SolveOptions& options);
+  MapSolver(const RenderingMatrix& matrix, std::span<const float> row_weights,
+            const CubePyramidLayout& layout, const SolveOptions& options);
   ~MapSolver();
   MapSolver(MapSolver&&) noexcept;
   MapSolver& operator=(MapSolver&&) noexcept;

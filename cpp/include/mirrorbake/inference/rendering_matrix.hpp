@@ -29,11 +29,11 @@ CubeFootprint lookup_footprint(const SurfaceSamples& samples, std::size_t sample
 /// that the weights of each row sum to 1; one column per texel of every mip level.
 struct RenderingMatrix {
   std::size_t columns = 0;
-  std::vector<std::uint64_t> row_offsets;   ///< rows + 1
-  std::vector<std::uint32_t> texels;        ///< column of each entry, ascending in a row
-  std::vector<float> weights;               ///< > 0
-  std::vector<std::uint32_t> row_pixels;    ///< y · width + x, ascending
-  std::vector<std::uint32_t> row_samples;   ///< how many samples of the pixel see the part, ≥ 1
+  std::vector<std::uint64_t> row_offsets;  ///< rows + 1
+  std::vector<std::uint32_t> texels;       ///< column of each entry, ascending in a row
+  std::vector<float> weights;              ///< > 0
+  std::vector<std::uint32_t> row_pixels;   ///< y · width + x, ascending
+  std::vector<std::uint32_t> row_samples;  ///< how many samples of the pixel see the part, ≥ 1
 
   std::size_t rows() const { return row_pixels.size(); }
   std::size_t nonzeros() const { return texels.size(); }

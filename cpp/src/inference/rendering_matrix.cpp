@@ -1,6 +1,7 @@
 #include "mirrorbake/inference/rendering_matrix.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <string>
 
 #include "mirrorbake/core/error.hpp"
@@ -48,21 +49,54 @@ void check_lengths(const SurfaceSamples& samples) {
   check("dreflection_dy", samples.dreflection_dy.size());
 }
 
-// Adds up the weights of equal texels and orders them.
-void merge(std::vector<TexelWeight>& row) {
-  std::sort(row.begin(), row.end(), [](const TexelWeight& a, const TexelWeight& b) {
-    return a.texel != b.texel ? a.texel < b.texel : a.weight < b.weight;
-  });
-  std::size_t last = 0;
-  for (std::size_t i = 1; i < row.size(); ++i) {
-    if (row[i].texel == row[last].texel) {
-      row[last].weight += row[i].weight;
+// One row under construction: adds up the weights of equal texels. The footprints of a pixel's samples overlap almost
+// everywhere, so that a hash table of what is there beats sorting what comes.
+class RowAccumulator {
+ public:
+  // Empties the row and makes room for `entries` additions.
+  void start(std::size_t entries) {
+    const std::size_t wanted = std::bit_ceil(2 * entries + 2);
+    if (slots_.size() < wanted) {
+      slots_.assign(wanted, kEmpty);
+      shift_ = 32 - std::countr_zero(wanted);
     } else {
-      row[++last] = row[i];
+      for (std::uint32_t slot : used_) slots_[slot] = kEmpty;
     }
+    used_.clear();
+    row_.clear();
   }
-  row.resize(row.empty() ? 0 : last + 1);
-}
+
+  void add(std::uint32_t texel, float weight) {
+    // Fibonacci hashing (Knuth, TAOCP 3, §6.4) with linear probing.
+    std::uint32_t slot = (texel * 2654435769u) >> shift_;
+    const std::uint32_t mask = static_cast<std::uint32_t>(slots_.size() - 1);
+    while (slots_[slot] != kEmpty) {
+      TexelWeight& entry = row_[slots_[slot]];
+      if (entry.texel == texel) {
+        entry.weight += weight;
+        return;
+      }
+      slot = (slot + 1) & mask;
+    }
+    slots_[slot] = static_cast<std::uint32_t>(row_.size());
+    used_.push_back(slot);
+    row_.push_back({texel, weight});
+  }
+
+  // The row, by ascending texel. Valid until the next start; nothing may be added any more.
+  const std::vector<TexelWeight>& finish() {
+    std::sort(row_.begin(), row_.end(),
+              [](const TexelWeight& a, const TexelWeight& b) { return a.texel < b.texel; });
+    return row_;
+  }
+
+ private:
+  static constexpr std::uint32_t kEmpty = 0xffffffffu;
+  std::vector<std::uint32_t> slots_;  // index into row_
+  std::vector<std::uint32_t> used_;
+  std::vector<TexelWeight> row_;
+  int shift_ = 32;
+};
 
 }  // namespace
 
@@ -102,19 +136,19 @@ RenderingMatrix build_rendering_matrix(const SurfaceSamples& samples, int part, 
   std::vector<std::vector<TexelWeight>> entries(chunks);
   parallel_for(rows, kRowsPerChunk, [&](std::size_t begin, std::size_t end) {
     std::vector<TexelWeight>& chunk = entries[begin / kRowsPerChunk];
-    std::vector<TexelWeight> row;
+    RowAccumulator accumulator;
     for (std::size_t r = begin; r < end; ++r) {
       const std::size_t count = groups.offsets[r + 1] - groups.offsets[r];
       const float mean = 1.0F / static_cast<float>(count);
-      row.clear();
+      accumulator.start(count * CubeFootprint{}.texels.size());
       for (std::size_t k = groups.offsets[r]; k < groups.offsets[r + 1]; ++k) {
         const CubeFootprint footprint = lookup_footprint(samples, groups.members[k], proxy, layout, options);
         for (int t = 0; t < footprint.count; ++t) {
           const TexelWeight& entry = footprint.texels[static_cast<std::size_t>(t)];
-          if (entry.weight > 0.0F) row.push_back({entry.texel, mean * entry.weight});
+          if (entry.weight > 0.0F) accumulator.add(entry.texel, mean * entry.weight);
         }
       }
-      merge(row);
+      const std::vector<TexelWeight>& row = accumulator.finish();
       matrix.row_pixels[r] = samples.pixel[groups.members[groups.offsets[r]]];
       matrix.row_samples[r] = static_cast<std::uint32_t>(count);
       matrix.row_offsets[r + 1] = row.size();

@@ -362,12 +362,12 @@ class MapSolver:
 class PartMaps:
     """Environment maps of one part of the reflector."""
 
-    def __init__(self, distant_proxy: Proxy, distant: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], local_proxy: Proxy = ..., local: "std::optional<ndarray<float const, detail::shape<-1l, -1l>, c_contig, device::cpu> >" | None = None) -> None:
+    def __init__(self, distant_proxy: Proxy, distant: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], local_proxy: Proxy = ..., local: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)] | None = None) -> None:
         """
         distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part without a local layer.
         """
 
-def render_reflector(samples: "mirrorbake::SurfaceSamples", parts: Sequence[PartMaps], layout: CubePyramidLayout, diffuse: "std::optional<ndarray<float const, detail::shape<-1l, 3l>, c_contig, device::cpu> >" | None = None, options: LookupOptions = ...) -> NDArray[numpy.float32]:
+def render_reflector(samples: "mirrorbake::SurfaceSamples", parts: Sequence[PartMaps], layout: CubePyramidLayout, diffuse: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, options: LookupOptions = ...) -> NDArray[numpy.float32]:
     """
     Draws the reflector from its maps: (L_local + (1 - alpha) L_distant) F + D per sample, averaged over the pixel.
 

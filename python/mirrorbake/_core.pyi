@@ -1,6 +1,7 @@
 """Compiled part of mirrorbake. Use it through the package `mirrorbake`."""
 
 from collections.abc import Sequence
+import enum
 from typing import Annotated
 
 import numpy
@@ -184,6 +185,255 @@ def save_image(path: str, pixels: Annotated[NDArray[numpy.float32], dict(shape=(
     Write scene-linear pixels of shape (height, width, channels) atomically; the extension of the path decides the
     format. `channels` names the channels (default Y, YA, RGB or RGBA). `format`: automatic, half, float32, uint8
     or uint16. Raises FileError and InvalidArgument.
+    """
+
+class TriangleMesh:
+    """
+    Triangles with optional vertex normals, texture coordinates and parts. World space, metres.
+    """
+
+    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, parts: Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None:
+        """
+        Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from outside, unit
+        normals (V, 3) (default: flat shading), uvs (V, 2) with v up, and the part of each triangle (T,). Raises
+        InvalidArgument for anything not finite, indices out of range or a mesh without area.
+        """
+
+    @property
+    def positions(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """Vertices, (V, 3), a read-only view."""
+
+    @property
+    def normals(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """Unit vertex normals, (V, 3), or (0, 3) for flat shading."""
+
+    @property
+    def uvs(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """Texture coordinates, (V, 2), v up, or (0, 2)."""
+
+    @property
+    def triangles(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
+        """Vertex indices, (T, 3)."""
+
+    @property
+    def parts(self) -> Annotated[NDArray[numpy.uint16], dict(writable=False)]:
+        """Part of each triangle, (T,), or (0,) if all belong to part 0."""
+
+    def __repr__(self) -> str: ...
+
+def bounds(mesh: TriangleMesh) -> tuple[Sequence[float], Sequence[float]]:
+    """Smallest and largest coordinates of a mesh's vertices."""
+
+def make_teapot(subdivisions: int = 25, height: float = 0.15000000596046448) -> TriangleMesh:
+    """
+    The Utah teapot of 32 Bezier patches, `subdivisions`² × 2 triangles each (1 to 512; 25 gives the 40,000 of
+    [PEM] §6), `height` metres high, standing on y = 0 with the spout along +X. Parts: 0 body, 1 lid.
+    """
+
+def teapot_part_names() -> list[str]:
+    """Names of the teapot's parts, in order."""
+
+def make_box(min: Sequence[float], max: Sequence[float]) -> TriangleMesh:
+    """Box with axis-aligned sides, each with texture coordinates 0 to 1."""
+
+def make_sphere(centre: Sequence[float], radius: float, segments: int = 48) -> TriangleMesh:
+    """
+    Latitude-longitude sphere with `segments` (3 to 4096) around the equator.
+    """
+
+def make_cylinder(base: Sequence[float], radius: float, height: float, segments: int = 48) -> TriangleMesh:
+    """Upright closed cylinder; `base` is the centre of its lower cap."""
+
+def make_cone(base: Sequence[float], radius: float, height: float, segments: int = 48) -> TriangleMesh:
+    """Upright closed cone; `base` is the centre of its base."""
+
+def make_torus(centre: Sequence[float], ring_radius: float, tube_radius: float, segments: int = 48) -> TriangleMesh:
+    """Torus about the vertical axis through `centre`."""
+
+def make_rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> TriangleMesh:
+    """
+    Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.
+    """
+
+class FresnelModel(enum.Enum):
+    """How the reflectance of a mirror depends on the angle."""
+
+    constant = 0
+    """r0 at every angle"""
+
+    schlick = 1
+    """Schlick's approximation from r0"""
+
+    dielectric = 2
+    """unpolarised, relative index eta"""
+
+    conductor = 3
+    """unpolarised, complex index eta + i k"""
+
+class Fresnel:
+    """Reflectance per colour channel as a function of the angle."""
+
+    def __init__(self, model: FresnelModel = FresnelModel.constant, r0: Sequence[float] = (0.0, 0.0, 0.0), eta: Sequence[float] = (1.5, 1.5, 1.5), k: Sequence[float] = (0.0, 0.0, 0.0)) -> None: ...
+
+    @property
+    def model(self) -> FresnelModel: ...
+
+    @model.setter
+    def model(self, arg: FresnelModel, /) -> None: ...
+
+    @property
+    def r0(self) -> Sequence[float]:
+        """
+        constant: reflectance; schlick: reflectance at normal incidence; in [0, 1]
+        """
+
+    @r0.setter
+    def r0(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def eta(self) -> Sequence[float]:
+        """dielectric, conductor: real part of the relative index, above 0"""
+
+    @eta.setter
+    def eta(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def k(self) -> Sequence[float]:
+        """conductor: extinction coefficient, at least 0"""
+
+    @k.setter
+    def k(self, arg: Sequence[float], /) -> None: ...
+
+class LayerModel(enum.Enum):
+    """How diffuse light L_d and mirrored light L_m add up."""
+
+    additive = 0
+    """F L_m + L_d"""
+
+    coated = 1
+    """F L_m + (1 − F) L_d"""
+
+class Material:
+    """What a surface does with light."""
+
+    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: int = -1, specular: bool = False, fresnel: Fresnel = ..., layers: LayerModel = LayerModel.additive, emission: Sequence[float] = (0.0, 0.0, 0.0)) -> None: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @name.setter
+    def name(self, arg: str, /) -> None: ...
+
+    @property
+    def albedo(self) -> Sequence[float]:
+        """Lambertian reflectance per channel, in [0, 1]"""
+
+    @albedo.setter
+    def albedo(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def albedo_texture(self) -> int:
+        """index of a texture of the scene, or −1"""
+
+    @albedo_texture.setter
+    def albedo_texture(self, arg: int, /) -> None: ...
+
+    @property
+    def specular(self) -> bool:
+        """whether it mirrors, weighted by `fresnel`"""
+
+    @specular.setter
+    def specular(self, arg: bool, /) -> None: ...
+
+    @property
+    def fresnel(self) -> Fresnel: ...
+
+    @fresnel.setter
+    def fresnel(self, arg: Fresnel, /) -> None: ...
+
+    @property
+    def layers(self) -> LayerModel: ...
+
+    @layers.setter
+    def layers(self, arg: LayerModel, /) -> None: ...
+
+    @property
+    def emission(self) -> Sequence[float]:
+        """radiance emitted on the front side, W sr⁻¹ m⁻²"""
+
+    @emission.setter
+    def emission(self, arg: Sequence[float], /) -> None: ...
+
+class Scene:
+    """
+    Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours and
+    radiance are scene-linear with Rec.709 primaries. The add_ functions return the new thing's index.
+    """
+
+    def __init__(self) -> None: ...
+
+    def add_texture(self, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)]) -> int:
+        """
+        Add a repeating texture of shape (height, width, 3), values in [0, 1], row 0 at the top.
+        """
+
+    def add_material(self, material: Material) -> int:
+        """Add a copy of a material."""
+
+    def add_object(self, name: str, mesh: TriangleMesh, material: int, part_names: Sequence[str] = []) -> int:
+        """
+        Add a copy of a mesh, in world space, with the material of that index. `part_names` names its parts, if it
+        has more than one.
+        """
+
+    def add_rectangle_light(self, corner: Sequence[float], edge_u: Sequence[float], edge_v: Sequence[float], radiance: Sequence[float]) -> int:
+        """
+        Add a rectangle that emits `radiance` (W sr⁻¹ m⁻²) along edge_u × edge_v.
+        """
+
+    def add_point_light(self, position: Sequence[float], intensity: Sequence[float]) -> int:
+        """Add a light of `intensity` W sr⁻¹ in every direction."""
+
+    def set_environment(self, panorama: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], scale: float = 1.0, rotation_degrees: float = 0.0) -> None:
+        """
+        Surround the scene with a latitude-longitude panorama of radiance, shape (height, width, 3): its centre looks
+        along −Z, +X is to the right of the centre, +Y is the top row. It is multiplied with `scale` and turned
+        counter-clockwise about +Y, seen from above.
+        """
+
+    @property
+    def object_names(self) -> list[str]: ...
+
+    @property
+    def material_names(self) -> list[str]: ...
+
+    def object_mesh(self, object: int) -> TriangleMesh:
+        """Copy of an object's mesh."""
+
+    def object_material(self, object: int) -> int:
+        """Index of an object's material."""
+
+    def object_part_names(self, object: int) -> list[str]:
+        """Names of an object's parts; its own if it has only one."""
+
+    def material(self, material: int) -> Material:
+        """Copy of a material."""
+
+    def set_material(self, index: int, material: Material) -> None:
+        """Replace a material."""
+
+    def bounds(self, object: int) -> tuple[Sequence[float], Sequence[float]]:
+        """Smallest and largest coordinates of an object's vertices."""
+
+    def validate(self) -> None:
+        """
+        Raise InvalidArgument, naming the object and the field, if anything in the scene is unusable.
+        """
+
+def make_room() -> Scene:
+    """
+    The built-in furnished room. The table's top is the plane y = 0 with its centre at the origin; the reflector,
+    which is not part of it, stands there.
     """
 
 class CubePyramidLayout:

@@ -226,6 +226,10 @@ void validate(const Scene& scene) {
   if (scene.environment) check_light("environment", *scene.environment);
 }
 
+void validate(const TriangleMesh& mesh) {
+  check_mesh("mesh", mesh, std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1);
+}
+
 Bounds bounds(const TriangleMesh& mesh) {
   if (mesh.positions.empty()) throw InvalidArgument("mesh vertex count", "0", "at least one vertex");
   Bounds box{mesh.positions.front(), mesh.positions.front()};

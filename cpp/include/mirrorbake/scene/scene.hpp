@@ -81,6 +81,9 @@ struct Scene {
 /// The message names the object, material, texture or light, the field, its value and what was expected.
 void validate(const Scene& scene);
 
+/// The same for one mesh.
+void validate(const TriangleMesh& mesh);
+
 /// Axis-aligned bounds of a mesh's vertices. Throws InvalidArgument if there are none.
 struct Bounds {
   glm::vec3 min{0.0F};

@@ -1,0 +1,131 @@
+"""Scenes from Python: what goes in comes out, and what is wrong is named."""
+
+import numpy as np
+import pytest
+
+from mirrorbake import _core
+
+TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0]], dtype=np.float32)
+INDICES = np.array([[0, 1, 2]], dtype=np.uint32)
+
+
+def test_mesh_returns_what_it_was_given() -> None:
+    normals = np.tile(np.array([0, 0, 1], dtype=np.float32), (3, 1))
+    uvs = np.array([[0, 0], [1, 0], [0, 1]], dtype=np.float32)
+    mesh = _core.TriangleMesh(TRIANGLE, INDICES, normals, uvs, np.array([3], dtype=np.uint16))
+    np.testing.assert_array_equal(mesh.positions, TRIANGLE)
+    np.testing.assert_array_equal(mesh.triangles, INDICES)
+    np.testing.assert_array_equal(mesh.normals, normals)
+    np.testing.assert_array_equal(mesh.uvs, uvs)
+    np.testing.assert_array_equal(mesh.parts, [3])
+    assert repr(mesh) == "TriangleMesh(3 vertices, 1 triangles)"
+
+
+def test_mesh_converts_other_types_and_leaves_out_what_is_not_given() -> None:
+    mesh = _core.TriangleMesh(TRIANGLE.astype(np.float64), INDICES.astype(np.int64))
+    np.testing.assert_array_equal(mesh.positions, TRIANGLE)
+    assert mesh.normals.shape == (0, 3)
+    assert mesh.uvs.shape == (0, 2)
+    assert mesh.parts.shape == (0,)
+
+
+def test_views_are_read_only_and_outlive_the_mesh() -> None:
+    mesh = _core.TriangleMesh(TRIANGLE, INDICES)
+    positions = mesh.positions
+    with pytest.raises(ValueError, match="read-only"):
+        positions[0, 0] = 1.0
+    del mesh
+    np.testing.assert_array_equal(positions, TRIANGLE)
+
+
+def test_bad_meshes_are_rejected_by_field() -> None:
+    bad = TRIANGLE.copy()
+    bad[1, 2] = np.nan
+    with pytest.raises(_core.InvalidArgument, match=r"mesh vertex 1 is .*nan"):
+        _core.TriangleMesh(bad, INDICES)
+    with pytest.raises(_core.InvalidArgument, match="triangle 0 vertex index is 3"):
+        _core.TriangleMesh(TRIANGLE, np.array([[0, 1, 3]]))
+    with pytest.raises(_core.InvalidArgument, match="area is 0"):
+        _core.TriangleMesh(TRIANGLE, np.array([[0, 1, 1]]))
+    with pytest.raises(_core.InvalidArgument, match="at least one triangle"):
+        _core.TriangleMesh(np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint32))
+    with pytest.raises(TypeError):
+        _core.TriangleMesh(np.zeros((3, 2), dtype=np.float32), INDICES)
+
+
+def test_scene_holds_what_is_added() -> None:
+    scene = _core.Scene()
+    texture = scene.add_texture(np.full((2, 4, 3), 0.25, dtype=np.float32))
+    fresnel = _core.Fresnel(_core.FresnelModel.schlick, r0=(0.9, 0.8, 0.7))
+    material = scene.add_material(
+        _core.Material(
+            name="gold",
+            albedo=(0.1, 0.2, 0.3),
+            albedo_texture=texture,
+            specular=True,
+            fresnel=fresnel,
+            layers=_core.LayerModel.coated,
+            emission=(0, 0, 1),
+        )
+    )
+    mesh = _core.TriangleMesh(TRIANGLE, np.array([[0, 1, 2], [2, 1, 0]]), parts=np.array([0, 1]))
+    assert scene.add_object("sail", mesh, material, ["front", "back"]) == 0
+    assert scene.add_rectangle_light((0, 1, 0), (1, 0, 0), (0, 0, 1), (3, 3, 3)) == 0
+    assert scene.add_point_light((0, 2, 0), (1, 1, 1)) == 0
+    scene.set_environment(np.ones((4, 8, 3), dtype=np.float32), scale=2.0, rotation_degrees=30.0)
+    scene.validate()
+
+    assert scene.object_names == ["sail"]
+    assert scene.material_names == ["gold"]
+    assert scene.object_material(0) == material
+    assert scene.object_part_names(0) == ["front", "back"]
+    assert scene.bounds(0) == ((0, 0, 0), (1, 2, 0))
+    np.testing.assert_array_equal(scene.object_mesh(0).parts, [0, 1])
+    back = scene.material(0)
+    assert back.fresnel.model == _core.FresnelModel.schlick
+    np.testing.assert_allclose(back.fresnel.r0, (0.9, 0.8, 0.7), rtol=1e-7)
+    assert back.layers == _core.LayerModel.coated
+    back.fresnel = _core.Fresnel(_core.FresnelModel.conductor, eta=(0.2, 0.9, 1.1), k=(3.9, 2.4, 2.2))
+    scene.set_material(0, back)
+    assert scene.material(0).fresnel.model == _core.FresnelModel.conductor
+
+
+def test_scene_errors_name_the_culprit() -> None:
+    scene = _core.Scene()
+    with pytest.raises(_core.InvalidArgument, match="material is 0"):
+        scene.add_object("sail", _core.TriangleMesh(TRIANGLE, INDICES), 0)
+    scene.add_material(_core.Material(name="too white", albedo=(1.5, 0, 0)))
+    with pytest.raises(_core.InvalidArgument, match="material 0 'too white' albedo"):
+        scene.validate()
+    with pytest.raises(_core.InvalidArgument, match="object is 7"):
+        scene.bounds(7)
+    with pytest.raises(TypeError):
+        scene.add_texture(np.zeros((2, 2, 4), dtype=np.float32))
+
+
+def test_teapot_in_its_room_is_a_valid_scene() -> None:
+    scene = _core.make_room()
+    chrome = scene.add_material(_core.Material(name="chrome", specular=True))
+    teapot = _core.make_teapot(subdivisions=25, height=0.15)
+    assert teapot.triangles.shape == (40_000, 3)
+    assert np.isfinite(teapot.normals).all()
+    reflector = scene.add_object("teapot", teapot, chrome, _core.teapot_part_names())
+    scene.validate()
+    assert scene.object_part_names(reflector) == ["body", "lid"]
+    assert _core.bounds(teapot)[1][1] == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "low", "high"),
+    [
+        (_core.make_box((0, 0, 0), (1, 2, 3)), [0, 0, 0], [1, 2, 3]),
+        (_core.make_sphere((1, 1, 1), 0.5, segments=8), [0.5, 0.5, 0.5], [1.5, 1.5, 1.5]),
+        (_core.make_cylinder((0, 0, 0), 1.0, 2.0, segments=8), [-1, 0, -1], [1, 2, 1]),
+        (_core.make_cone((0, 0, 0), 1.0, 2.0, segments=8), [-1, 0, -1], [1, 2, 1]),
+        (_core.make_torus((0, 0, 0), 1.0, 0.25, segments=16), [-1.25, -0.25, -1.25], [1.25, 0.25, 1.25]),
+        (_core.make_rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), [0, 0, 0], [1, 1, 0]),
+    ],
+)
+def test_shapes_have_their_extent(mesh: _core.TriangleMesh, low: list[float], high: list[float]) -> None:
+    assert np.allclose(_core.bounds(mesh), (low, high), atol=1e-6)
+    assert mesh.normals.shape == mesh.positions.shape

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <numbers>
+
+#include "integrator.hpp"
+#include "world.hpp"
+
+/// What gathering light at the vertices of a mesh takes: the irradiance cache and Tracer::vertex_irradiance.
+namespace mirrorbake::tracing {
+
+struct TriangleCorner {
+  std::uint32_t object;
+  std::uint32_t triangle;
+  std::uint32_t corner;  ///< 0…2
+};
+
+/// Unit normal on the triangle's front, or 0 if it has no area.
+inline glm::vec3 face_normal(const World& world, std::uint32_t object, std::uint32_t triangle) {
+  const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(object));
+  const glm::uvec3 t = world.scene.objects[object].mesh.triangles[triangle];
+  const glm::dvec3 a = p[t.x];
+  const glm::dvec3 n = glm::cross(glm::dvec3(p[t.y]) - a, glm::dvec3(p[t.z]) - a);
+  const double length = glm::length(n);
+  return length > 0.0 ? glm::vec3(n / length) : glm::vec3(0.0F);
+}
+
+/// A random point of the triangle near one of its corners, seen from the side of `towards`. At the corner
+/// itself a ray would start in the edge between two walls, inside both.
+inline Surface surface_near_corner(const World& world, const TriangleCorner& corner, glm::vec2 u,
+                                   glm::vec3 towards) {
+  constexpr float kSpread = 0.25F;  // of the way across the triangle
+  const glm::vec2 weights = kSpread * u.x * glm::vec2(1.0F - u.y, u.y);
+  float barycentric[3];
+  barycentric[corner.corner] = 1.0F - weights.x - weights.y;
+  barycentric[(corner.corner + 1) % 3] = weights.x;
+  barycentric[(corner.corner + 2) % 3] = weights.y;
+  const Hit hit{0.0F, corner.object, corner.triangle, barycentric[1], barycentric[2]};
+  return surface_at(world.scene, world.rays, hit, -towards);
+}
+
+/// What a gather ray picks up: the light that diffuse surfaces reflect. Emission is left out, next-event
+/// estimation has it.
+struct Gathered {
+  glm::vec3 radiance{0.0F};
+  bool nothing = false;         ///< the ray left the scene
+  bool dark_back_side = false;  ///< it hit the inside of a body, and no light was there
+};
+
+/// Follows mirrors a few bounces. `irradiance_at(surface, u)` is the irradiance of a surface, u two random
+/// numbers.
+template <typename IrradianceAt>
+Gathered gather_along(const World& world, Ray ray, const SampleStream& stream,
+                      const IrradianceAt& irradiance_at) {
+  constexpr int kMirrorBounces = 4;
+  Gathered result;
+  glm::vec3 throughput(1.0F);
+  for (int bounce = 0;; ++bounce) {
+    const Hit hit = world.rays.all().intersect(ray);
+    if (hit.missed() || world.is_light(hit)) {
+      result.nothing = bounce == 0 && hit.missed();
+      return result;
+    }
+    const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
+    if (surface.albedo != glm::vec3(0.0F)) {
+      const glm::vec2 u = stream.get(dimension_base(bounce, 0) + light_dimension);
+      result.radiance +=
+          throughput * surface.albedo * std::numbers::inv_pi_v<float> * irradiance_at(surface, u);
+    }
+    if (bounce == 0) result.dark_back_side = !surface.front && result.radiance == glm::vec3(0.0F);
+    if (!surface.specular() || bounce == kMirrorBounces) return result;
+    throughput *= surface.fresnel;
+    ray = {offset_origin(surface, surface.reflection), surface.reflection};
+  }
+}
+
+}  // namespace mirrorbake::tracing

@@ -1,0 +1,192 @@
+#include "irradiance_cache.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "gather.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "world.hpp"
+
+namespace mirrorbake::tracing {
+namespace {
+
+// Rays after which a hemisphere inside a closed body is given up.
+constexpr int kProbeRays = 16;
+// Corners of a flat-shaded mesh share a slot if their faces differ by less than acos(0.999) = 2.6°.
+constexpr float kSameFace = 0.999F;
+
+}  // namespace
+
+IrradianceCache::IrradianceCache() = default;
+IrradianceCache::~IrradianceCache() = default;
+IrradianceCache::IrradianceCache(IrradianceCache&&) noexcept = default;
+IrradianceCache& IrradianceCache::operator=(IrradianceCache&&) noexcept = default;
+
+IrradianceCache::IrradianceCache(const World& world) {
+  assign_slots(world);
+  gather(world);
+}
+
+void IrradianceCache::assign_slots(const World& world) {
+  slot_of_corner_.resize(world.scene.objects.size());
+  std::uint32_t slots = 0;
+  for (std::size_t o = 0; o < world.scene.objects.size(); ++o) {
+    const Object& object = world.scene.objects[o];
+    if (world.scene.materials[static_cast<std::size_t>(object.material)].albedo == glm::vec3(0.0F)) continue;
+    const TriangleMesh& mesh = object.mesh;
+    std::vector<std::uint32_t>& slot = slot_of_corner_[o];
+    slot.resize(3 * mesh.triangles.size(), kNoSlot);
+    if (!mesh.normals.empty()) {
+      std::vector<std::uint32_t> slot_of_vertex(mesh.positions.size(), kNoSlot);
+      for (std::size_t i = 0; i < slot.size(); ++i) {
+        std::uint32_t& s = slot_of_vertex[mesh.triangles[i / 3][static_cast<int>(i % 3)]];
+        if (s == kNoSlot) s = slots++;
+        slot[i] = s;
+      }
+    } else {
+      // A chain per vertex of the slots made there so far, each with the face normal that it stands for.
+      struct Entry {
+        glm::vec3 normal;
+        std::uint32_t slot;
+        std::uint32_t next;
+      };
+      std::vector<Entry> entries;
+      std::vector<std::uint32_t> first(mesh.positions.size(), kNoSlot);
+      for (std::size_t i = 0; i < slot.size(); ++i) {
+        const auto triangle = static_cast<std::uint32_t>(i / 3);
+        const glm::vec3 n = face_normal(world, static_cast<std::uint32_t>(o), triangle);
+        std::uint32_t& head = first[mesh.triangles[triangle][static_cast<int>(i % 3)]];
+        std::uint32_t e = head;
+        while (e != kNoSlot && glm::dot(entries[e].normal, n) < kSameFace) e = entries[e].next;
+        if (e == kNoSlot) {
+          entries.push_back({n, slots++, head});
+          e = head = static_cast<std::uint32_t>(entries.size() - 1);
+        }
+        slot[i] = entries[e].slot;
+      }
+    }
+  }
+
+  first_corner_.assign(slots + 1, 0);
+  for (const auto& object : slot_of_corner_) {
+    for (std::uint32_t s : object) ++first_corner_[s + 1];
+  }
+  for (std::size_t s = 0; s < slots; ++s) first_corner_[s + 1] += first_corner_[s];
+  corners_.resize(first_corner_.back());
+  std::vector<std::uint32_t> next(first_corner_.begin(), first_corner_.end() - 1);
+  for (std::size_t o = 0; o < slot_of_corner_.size(); ++o) {
+    for (std::size_t i = 0; i < slot_of_corner_[o].size(); ++i) {
+      corners_[next[slot_of_corner_[o][i]]++] = {static_cast<std::uint32_t>(o),
+                                                 static_cast<std::uint32_t>(i / 3),
+                                                 static_cast<std::uint32_t>(i % 3)};
+    }
+  }
+}
+
+glm::vec3 IrradianceCache::interpolate(const Sides& values, const Surface& surface) const {
+  const std::vector<std::uint32_t>& slots = slot_of_corner_[static_cast<std::size_t>(surface.object)];
+  if (slots.empty()) return glm::vec3(0.0F);
+  const std::uint32_t* slot = &slots[3 * std::size_t{surface.triangle}];
+  const std::vector<glm::vec3>& value = values.side[surface.front ? 0 : 1];
+  return (1.0F - surface.barycentric.x - surface.barycentric.y) * value[slot[0]] +
+         surface.barycentric.x * value[slot[1]] + surface.barycentric.y * value[slot[2]];
+}
+
+void IrradianceCache::gather(const World& world) {
+  const std::size_t slots = first_corner_.size() - 1;
+  const int rays = world.options.cache_rays;
+  const int probes = std::min(rays, kProbeRays);
+  Sides previous;
+  std::vector<std::uint8_t> buried[2];
+  std::vector<std::uint8_t> skipped[2];
+  for (int side = 0; side < 2; ++side) {
+    total_.side[side].assign(slots, glm::vec3(0.0F));
+    buried[side].assign(slots, 0);
+    skipped[side].assign(slots, 0);
+  }
+
+  for (int pass = 0; pass < world.options.cache_bounces; ++pass) {
+    const auto irradiance_at = [&](const Surface& surface, glm::vec2 u) {
+      return pass == 0 ? direct_irradiance(world, surface, u, false) : interpolate(previous, surface);
+    };
+    Sides found;
+    for (int side = 0; side < 2; ++side) {
+      found.side[side].assign(slots, glm::vec3(0.0F));
+      parallel_for(slots, 32, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t slot = begin; slot < end; ++slot) {
+          if (skipped[side][slot] != 0) continue;
+          const std::uint32_t first = first_corner_[slot];
+          const std::uint32_t count = first_corner_[slot + 1] - first;
+          glm::vec3 sum(0.0F);
+          int traced = 0;
+          int dark = 0;
+          int nothing = 0;
+          for (int r = 0; r < rays; ++r) {
+            // Inside a closed body, or on a back that faces nothing at all.
+            if (pass == 0 && r == probes && (dark == traced || (side == 1 && dark + nothing == traced))) {
+              skipped[side][slot] = 1;
+              break;
+            }
+            const auto index = static_cast<std::uint32_t>(r);
+            const SampleStream stream =
+                sample_stream(world.options.seed, 2 * slot + static_cast<std::size_t>(side), index);
+            const TriangleCorner& corner = corners_[first + index % count];
+            const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
+            if (n == glm::vec3(0.0F)) continue;
+            const Surface start =
+                surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), side == 0 ? n : -n);
+            const glm::vec3 direction = sample_cosine_hemisphere(
+                Frame(start.normal), stream.get(dimension_base(0, 0) + diffuse_dimension));
+            if (!(glm::dot(direction, start.geometric_normal) > 0.0F)) continue;
+            const Gathered gathered =
+                gather_along(world, {offset_origin(start, direction), direction}, stream, irradiance_at);
+            sum += gathered.radiance;
+            dark += gathered.dark_back_side ? 1 : 0;
+            nothing += gathered.nothing ? 1 : 0;
+            ++traced;
+          }
+          found.side[side][slot] = sum * (std::numbers::pi_v<float> / static_cast<float>(rays));
+          if (pass == 0) buried[side][slot] = 2 * dark > traced ? 1 : 0;
+        }
+      });
+      fill_buried(found.side[side], buried[side]);
+      for (std::size_t i = 0; i < slots; ++i) total_.side[side][i] += found.side[side][i];
+    }
+    previous = std::move(found);
+  }
+}
+
+void IrradianceCache::fill_buried(std::vector<glm::vec3>& values,
+                                  const std::vector<std::uint8_t>& buried) const {
+  // From the rim inwards, one ring of triangles per round.
+  constexpr int kRounds = 16;
+  std::vector<std::uint8_t> unknown = buried;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::pair<std::uint32_t, glm::vec3>> found;
+    for (std::uint32_t slot = 0; slot < unknown.size(); ++slot) {
+      if (unknown[slot] == 0) continue;
+      glm::vec3 sum(0.0F);
+      int count = 0;
+      for (std::uint32_t c = first_corner_[slot]; c < first_corner_[slot + 1]; ++c) {
+        const std::uint32_t* triangle =
+            &slot_of_corner_[corners_[c].object][3 * std::size_t{corners_[c].triangle}];
+        for (int k = 0; k < 3; ++k) {
+          if (unknown[triangle[k]] != 0) continue;
+          sum += values[triangle[k]];
+          ++count;
+        }
+      }
+      if (count > 0) found.emplace_back(slot, sum / static_cast<float>(count));
+    }
+    if (found.empty()) return;
+    for (const auto& [slot, value] : found) {
+      values[slot] = value;
+      unknown[slot] = 0;
+    }
+  }
+}
+
+}  // namespace mirrorbake::tracing

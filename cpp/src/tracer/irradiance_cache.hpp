@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "surface.hpp"
+
+namespace mirrorbake::tracing {
+
+struct World;
+struct TriangleCorner;
+
+/// Indirect irradiance at the corners of all diffuse triangles, one value per side (IndirectLight::cached).
+///
+/// Each pass gathers one more diffuse bounce: rays with a cosine distribution leave points around a vertex,
+/// and pick up the direct light (first pass) or the previous pass's irradiance where they land. A ray that
+/// lands on a mirror follows it a few bounces, but emission seen that way is left out: a gathered caustic
+/// would be noise. Vertices buried in another body see only the dark inside of it; they take the value of
+/// their neighbours, or triangles that stick out of the body would fade to black.
+class IrradianceCache {
+ public:
+  IrradianceCache();
+  explicit IrradianceCache(const World& world);
+  ~IrradianceCache();
+  IrradianceCache(IrradianceCache&&) noexcept;
+  IrradianceCache& operator=(IrradianceCache&&) noexcept;
+
+  /// On the side that the surface is seen from.
+  glm::vec3 irradiance(const Surface& surface) const { return interpolate(total_, surface); }
+
+ private:
+  static constexpr std::uint32_t kNoSlot = ~0U;
+
+  /// Irradiance per slot: of the front and of the back side.
+  struct Sides {
+    std::vector<glm::vec3> side[2];
+  };
+
+  void assign_slots(const World& world);
+  glm::vec3 interpolate(const Sides& values, const Surface& surface) const;
+  /// Adds up what the passes bring.
+  void gather(const World& world);
+  void fill_buried(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
+
+  /// Slot of each triangle corner, three per triangle, per object; empty for objects without diffuse
+  /// reflection.
+  std::vector<std::vector<std::uint32_t>> slot_of_corner_;
+  /// Corners of each slot: corners_[first_corner_[slot]] … corners_[first_corner_[slot + 1]].
+  std::vector<std::uint32_t> first_corner_;
+  std::vector<TriangleCorner> corners_;
+  Sides total_;
+};
+
+}  // namespace mirrorbake::tracing

@@ -1,0 +1,339 @@
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+#include <string>
+#include <utility>
+
+#include "camera_rays.hpp"
+#include "integrator.hpp"
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "options.hpp"
+#include "state.hpp"
+
+namespace mirrorbake {
+namespace {
+
+using tracing::CameraRays;
+using tracing::Coherence;
+using tracing::Hit;
+using tracing::PathLimits;
+using tracing::Ray;
+using tracing::RayScene;
+using tracing::SampleStream;
+using tracing::Surface;
+using tracing::World;
+
+/// Applies `visit` to the same array of two SurfaceSamples, one array after the other.
+template <typename Visit>
+void for_each_array(SurfaceSamples& a, SurfaceSamples& b, const Visit& visit) {
+  visit(a.pixel, b.pixel);
+  visit(a.part, b.part);
+  visit(a.triangle, b.triangle);
+  visit(a.barycentric, b.barycentric);
+  visit(a.position, b.position);
+  visit(a.normal, b.normal);
+  visit(a.reflection, b.reflection);
+  visit(a.dposition_dx, b.dposition_dx);
+  visit(a.dposition_dy, b.dposition_dy);
+  visit(a.dreflection_dx, b.dreflection_dx);
+  visit(a.dreflection_dy, b.dreflection_dy);
+  visit(a.fresnel, b.fresnel);
+  visit(a.albedo, b.albedo);
+  visit(a.diffuse, b.diffuse);
+  visit(a.local, b.local);
+  visit(a.distant, b.distant);
+  visit(a.hit_distance, b.hit_distance);
+}
+
+/// One image row: its samples in order, and the beauty value of each where light is traced.
+struct Row {
+  SurfaceSamples samples;
+  std::vector<glm::vec3> beauty;
+};
+
+/// The rows one after the other. Empties them.
+SurfaceSamples concatenate(std::vector<Row>& rows, const Camera& camera, const TraceOptions& options) {
+  SurfaceSamples all;
+  all.width = camera.width;
+  all.height = camera.height;
+  all.samples_per_pixel = options.samples_per_pixel;
+  for (Row& row : rows) {
+    for_each_array(all, row.samples, [](auto& whole, auto& part) {
+      whole.insert(whole.end(), part.begin(), part.end());
+      part = {};
+    });
+  }
+  return all;
+}
+
+void record_surface(SurfaceSamples& out, const World& world, const Surface& s, float distance,
+                    const CameraRays::Direction& ray, std::uint32_t pixel) {
+  const std::vector<std::uint16_t>& parts =
+      world.scene.objects[static_cast<std::size_t>(s.object)].mesh.parts;
+  out.pixel.push_back(pixel);
+  out.part.push_back(parts.empty() ? std::uint16_t{0} : parts[s.triangle]);
+  out.triangle.push_back(s.triangle);
+  out.barycentric.push_back(s.barycentric);
+  out.position.push_back(s.position + world.rays.origin());
+  out.normal.push_back(s.normal);
+  out.reflection.push_back(s.reflection);
+  const auto dx = tracing::surface_differential(world.scene, world.rays, s, distance, ray.dx);
+  const auto dy = tracing::surface_differential(world.scene, world.rays, s, distance, ray.dy);
+  out.dposition_dx.push_back(dx.position);
+  out.dposition_dy.push_back(dy.position);
+  out.dreflection_dx.push_back(dx.reflection);
+  out.dreflection_dy.push_back(dy.reflection);
+  out.fresnel.push_back(s.fresnel);
+  out.albedo.push_back(s.albedo);
+}
+
+/// The light that reaches the surface along its mirror direction, split by what the ray hits first.
+struct SpecularLayers {
+  glm::vec4 local{0.0F};
+  glm::vec3 distant{0.0F};
+  float hit_distance = 0.0F;
+};
+
+SpecularLayers trace_specular(const World& world, const RayScene::View& without_reflector,
+                              const Surface& surface, const PathLimits& limits, const SampleStream& stream) {
+  const Ray ray{tracing::offset_origin(surface, surface.reflection), surface.reflection};
+  SpecularLayers layers;
+  Hit hit = world.rays.all().intersect(ray);
+  if (!hit.missed() && static_cast<int>(hit.geometry) == surface.object) {
+    layers.local = glm::vec4(tracing::radiance(world, ray, hit, limits, stream, 1), 1.0F);
+    hit = without_reflector.intersect(ray);
+  }
+  layers.distant = tracing::radiance(world, ray, hit, limits, stream, 1);
+  layers.hit_distance = hit.distance;
+  return layers;
+}
+
+// From inside a body most directions meet the back of its surface first. Bodies need not be closed (the
+// teapot is open under its lid), so this asks for a majority rather than for a parity of crossings.
+void check_eye_outside(const World& world, const Camera& camera, int reflector) {
+  const glm::vec3 eye = camera.eye - world.rays.origin();
+  const Bounds& box = world.rays.object_bounds(reflector);
+  if (glm::any(glm::lessThan(eye, box.min)) || glm::any(glm::greaterThan(eye, box.max))) return;
+  constexpr int kProbes = 128;
+  int backs = 0;
+  for (std::uint32_t i = 0; i < kProbes; ++i) {
+    const glm::vec2 u = sobol_2d(i, 0);
+    const float y = 1.0F - 2.0F * u.x;
+    const float radius = std::sqrt(std::max(0.0F, 1.0F - y * y));
+    const float angle = 6.2831853F * u.y;
+    const Ray ray{eye, glm::normalize(glm::vec3(radius * std::cos(angle), y, radius * std::sin(angle)))};
+    const Hit hit = world.rays.all().intersect(ray);
+    if (hit.missed() || static_cast<int>(hit.geometry) != reflector) continue;
+    if (!tracing::surface_at(world.scene, world.rays, hit, ray.direction).front) ++backs;
+  }
+  if (2 * backs > kProbes) {
+    throw InvalidArgument("camera.eye", "inside object " + std::to_string(reflector),
+                          "a point outside the reflector");
+  }
+}
+
+// Sums over the covered samples of a pixel, then their means.
+class PixelLayers {
+ public:
+  void add(const Surface& s, glm::vec3 body, const SpecularLayers& specular, glm::vec3 position,
+           std::uint16_t part) {
+    ++covered_;
+    diffuse_ += body;
+    fresnel_ += s.fresnel;
+    local_ += specular.local;
+    distant_ += specular.distant;
+    if (std::isfinite(specular.hit_distance)) {
+      distance_ += specular.hit_distance;
+      ++finite_distances_;
+    }
+    reflection_ += s.reflection;
+    normal_ += s.normal;
+    position_ += position;
+    parts_.push_back(part);
+  }
+
+  /// Writes everything but the beauty, in the order of `channel_names`.
+  void write(float* out, int samples) {
+    const auto put = [&](const auto& sum) {
+      const double share = covered_ > 0 ? 1.0 / covered_ : 0.0;
+      for (int i = 0; i < sum.length(); ++i) *out++ = static_cast<float>(sum[i] * share);
+    };
+    *out++ = static_cast<float>(covered_) / static_cast<float>(samples);
+    put(diffuse_);
+    put(fresnel_);
+    put(local_);
+    put(distant_);
+    *out++ = covered_ == 0            ? 0.0F
+             : finite_distances_ == 0 ? std::numeric_limits<float>::infinity()
+                                      : static_cast<float>(distance_ / finite_distances_);
+    put(reflection_);
+    put(normal_);
+    put(position_);
+    *out++ = static_cast<float>(most_frequent_part());
+  }
+
+ private:
+  int most_frequent_part() {
+    std::sort(parts_.begin(), parts_.end());
+    int best = -1;
+    std::ptrdiff_t most = 0;
+    for (auto p = parts_.begin(); p != parts_.end();) {
+      const auto end = std::upper_bound(p, parts_.end(), *p);
+      if (end - p > most) {
+        most = end - p;
+        best = *p;
+      }
+      p = end;
+    }
+    return best;
+  }
+
+  int covered_ = 0;
+  int finite_distances_ = 0;
+  double distance_ = 0.0;
+  glm::dvec3 diffuse_{0.0}, fresnel_{0.0}, distant_{0.0}, reflection_{0.0}, normal_{0.0}, position_{0.0};
+  glm::dvec4 local_{0.0};
+  std::vector<std::uint16_t> parts_;
+};
+
+std::vector<std::string> channel_names() {
+  return {"R",
+          "G",
+          "B",
+          "coverage",
+          "diffuse.R",
+          "diffuse.G",
+          "diffuse.B",
+          "fresnel.R",
+          "fresnel.G",
+          "fresnel.B",
+          "specular_local.R",
+          "specular_local.G",
+          "specular_local.B",
+          "specular_local.A",
+          "specular_distant.R",
+          "specular_distant.G",
+          "specular_distant.B",
+          "distance",
+          "reflection.X",
+          "reflection.Y",
+          "reflection.Z",
+          "normal.X",
+          "normal.Y",
+          "normal.Z",
+          "position.X",
+          "position.Y",
+          "position.Z",
+          "part"};
+}
+
+void check_arguments(const World& world, const Camera& camera, int reflector, const TraceOptions& options) {
+  validate(camera);
+  tracing::validate(options);
+  const auto count = static_cast<int>(world.scene.objects.size());
+  if (reflector < 0 || reflector >= count) {
+    throw InvalidArgument("reflector", std::to_string(reflector),
+                          "an object number below " + std::to_string(count));
+  }
+  const Object& object = world.scene.objects[static_cast<std::size_t>(reflector)];
+  if (!world.scene.materials[static_cast<std::size_t>(object.material)].specular) {
+    throw InvalidArgument("reflector", "'" + object.name + "'", "an object with a specular material");
+  }
+  check_eye_outside(world, camera, reflector);
+}
+
+/// Calls `sample(ray, hit, stream, point)` for every sample of a pixel, in order; `point` is its place in the
+/// image.
+template <typename Sample>
+void for_each_sample(const World& world, const Camera& camera, const CameraRays& rays,
+                     const TraceOptions& options, int x, int y, const Sample& sample) {
+  const glm::vec3 eye = camera.eye - world.rays.origin();
+  for (int i = 0; i < options.samples_per_pixel; ++i) {
+    const SampleStream stream = tracing::pixel_stream(camera, options, x, y, i);
+    const glm::vec2 point = glm::vec2(x, y) + stream.get(tracing::camera_dimension);
+    const Ray ray{eye, rays.direction(point)};
+    sample(ray, world.rays.all().intersect(ray, Coherence::coherent), stream, point);
+  }
+}
+
+}  // namespace
+
+LayerTrace Tracer::trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const {
+  const World& world = state_->world;
+  check_arguments(world, camera, reflector, options);
+  const CameraRays rays(camera);
+  const RayScene::View without_reflector = world.rays.without({&reflector, 1});
+  const PathLimits limits{options.max_specular_depth, options.max_diffuse_depth};
+
+  LayerTrace trace;
+  trace.layers = Image(camera.width, camera.height, channel_names());
+  std::vector<Row> rows(static_cast<std::size_t>(camera.height));
+  parallel_for(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t y = begin; y < end; ++y) {
+      SurfaceSamples& out = rows[y].samples;
+      for (int x = 0; x < camera.width; ++x) {
+        const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera.width) +
+                           static_cast<std::uint32_t>(x);
+        glm::dvec3 beauty(0.0);
+        PixelLayers mean;
+        for_each_sample(world, camera, rays, options, x, static_cast<int>(y),
+                        [&](const Ray& ray, const Hit& hit, const SampleStream& stream, glm::vec2 point) {
+                          const glm::vec3 value = tracing::radiance(world, ray, hit, limits, stream, 0);
+                          beauty += glm::dvec3(value);
+                          if (hit.missed() || static_cast<int>(hit.geometry) != reflector) return;
+                          const Surface surface =
+                              tracing::surface_at(world.scene, world.rays, hit, ray.direction);
+                          const glm::vec3 body = tracing::body_radiance(world, surface, limits, stream, 0);
+                          const SpecularLayers specular =
+                              trace_specular(world, without_reflector, surface, limits, stream);
+                          record_surface(out, world, surface, hit.distance,
+                                         rays.direction_with_differentials(point), pixel);
+                          out.diffuse.push_back(body);
+                          out.local.push_back(specular.local);
+                          out.distant.push_back(specular.distant);
+                          out.hit_distance.push_back(specular.hit_distance);
+                          rows[y].beauty.push_back(value);
+                          mean.add(surface, body, specular, out.position.back(), out.part.back());
+                        });
+        float* channels = trace.layers.at(x, static_cast<int>(y));
+        for (int c = 0; c < 3; ++c) channels[c] = static_cast<float>(beauty[c] / options.samples_per_pixel);
+        mean.write(channels + 3, options.samples_per_pixel);
+      }
+    }
+  });
+  trace.samples = concatenate(rows, camera, options);
+  trace.sample_beauty.reserve(trace.samples.size());
+  for (const Row& row : rows)
+    trace.sample_beauty.insert(trace.sample_beauty.end(), row.beauty.begin(), row.beauty.end());
+  return trace;
+}
+
+SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
+                                        const TraceOptions& options) const {
+  const World& world = state_->world;
+  check_arguments(world, camera, reflector, options);
+  const CameraRays rays(camera);
+  std::vector<Row> rows(static_cast<std::size_t>(camera.height));
+  parallel_for(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t y = begin; y < end; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera.width) +
+                           static_cast<std::uint32_t>(x);
+        for_each_sample(world, camera, rays, options, x, static_cast<int>(y),
+                        [&](const Ray& ray, const Hit& hit, const SampleStream&, glm::vec2 point) {
+                          if (hit.missed() || static_cast<int>(hit.geometry) != reflector) return;
+                          const Surface surface =
+                              tracing::surface_at(world.scene, world.rays, hit, ray.direction);
+                          record_surface(rows[y].samples, world, surface, hit.distance,
+                                         rays.direction_with_differentials(point), pixel);
+                        });
+      }
+    }
+  });
+  return concatenate(rows, camera, options);
+}
+
+}  // namespace mirrorbake

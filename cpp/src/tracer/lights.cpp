@@ -1,0 +1,389 @@
+#include "lights.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "surface.hpp"
+
+namespace mirrorbake::tracing {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+// Interval of a cumulative distribution that holds u, and u's place in that interval, in [0,1).
+struct CdfSample {
+  int index;
+  float place;
+};
+CdfSample sample_cdf(const float* cdf, int count, float u) {
+  const float* after = std::upper_bound(cdf + 1, cdf + count, u);
+  const int i = static_cast<int>(after - cdf) - 1;
+  const float width = cdf[i + 1] - cdf[i];
+  const float place = width > 0.0F ? (u - cdf[i]) / width : 0.5F;
+  return {i, std::clamp(place, 0.0F, std::nextafter(1.0F, 0.0F))};
+}
+
+// Sums up in double and scales to end at exactly 1. Returns the sum; the distribution is uniform if it is 0.
+double normalise_cdf(float* cdf, const double* values, int count) {
+  double sum = 0.0;
+  for (int i = 0; i < count; ++i) sum += values[i];
+  double running = 0.0;
+  cdf[0] = 0.0F;
+  for (int i = 0; i < count; ++i) {
+    running += sum > 0.0 ? values[i] / sum : 1.0 / count;
+    cdf[i + 1] = static_cast<float>(std::min(running, 1.0));
+  }
+  cdf[count] = 1.0F;
+  return sum;
+}
+
+// A rectangle seen from a point, in the rectangle's frame, with the constants of Ureña, Fajardo, King, An
+// Area-Preserving Parametrization for Spherical Rectangles, EGSR 2013. In double: the angles nearly cancel.
+struct SphericalRectangle {
+  glm::dvec3 x, y, z;  // frame, z away from the point's side
+  double x0, y0, x1, y1, z0;
+  double b0, b1, k;
+  double solid_angle;
+
+  SphericalRectangle(glm::vec3 corner, glm::vec3 edge_u, glm::vec3 edge_v, glm::vec3 position) {
+    const double width = glm::length(glm::dvec3(edge_u));
+    const double height = glm::length(glm::dvec3(edge_v));
+    x = glm::dvec3(edge_u) / width;
+    y = glm::dvec3(edge_v) / height;
+    z = glm::cross(x, y);
+    const glm::dvec3 d = glm::dvec3(corner) - glm::dvec3(position);
+    z0 = glm::dot(d, z);
+    if (z0 > 0.0) {
+      z = -z;
+      z0 = -z0;
+    }
+    x0 = glm::dot(d, x);
+    y0 = glm::dot(d, y);
+    x1 = x0 + width;
+    y1 = y0 + height;
+    // z components of the normals of the four planes through the point and an edge.
+    const double n0 = -y0 / std::hypot(y0, z0);
+    const double n1 = x1 / std::hypot(x1, z0);
+    const double n2 = y1 / std::hypot(y1, z0);
+    const double n3 = -x0 / std::hypot(x0, z0);
+    const auto angle = [](double a, double b) { return std::acos(std::clamp(-a * b, -1.0, 1.0)); };
+    b0 = n0;
+    b1 = n2;
+    k = 2.0 * std::numbers::pi - angle(n2, n3) - angle(n3, n0);
+    solid_angle = angle(n0, n1) + angle(n1, n2) - k;
+  }
+
+  glm::dvec3 sample(glm::vec2 s) const {
+    const double au = s.x * solid_angle + k;
+    const double fu = (std::cos(au) * b0 - b1) / std::sin(au);
+    double cu = std::copysign(1.0, fu) / std::sqrt(fu * fu + b0 * b0);
+    cu = std::clamp(cu, -1.0, 1.0);
+    double xu = -(cu * z0) / std::max(1e-12, std::sqrt(1.0 - cu * cu));
+    xu = std::clamp(xu, x0, x1);
+    const double d = std::hypot(xu, z0);
+    const double h0 = y0 / std::hypot(d, y0);
+    const double h1 = y1 / std::hypot(d, y1);
+    const double hv = h0 + s.y * (h1 - h0);
+    const double yv = hv * hv < 1.0 - 1e-12 ? hv * d / std::sqrt(1.0 - hv * hv) : y1;
+    return xu * x + yv * y + z0 * z;  // relative to the point
+  }
+};
+
+// By area when the rectangle is small and far, where the two densities agree and the angles lose their
+// digits.
+bool by_solid_angle(glm::vec3 centre, float diagonal, bool orthogonal, glm::vec3 position) {
+  return orthogonal && glm::length(centre - position) < 2.0F * diagonal;
+}
+
+}  // namespace
+
+EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
+    : panorama_(&light.panorama), scale_(light.scale) {
+  const double angle = static_cast<double>(light.rotation_degrees) * std::numbers::pi / 180.0;
+  cosine_ = static_cast<float>(std::cos(angle));
+  sine_ = static_cast<float>(std::sin(angle));
+
+  const int width = panorama_->width;
+  const int height = panorama_->height;
+  const auto value = [&](int x, int y) {
+    const float* p = panorama_->at((x + width) % width, std::clamp(y, 0, height - 1));
+    return static_cast<double>(scale_) * static_cast<double>(luminance({p[0], p[1], p[2]}));
+  };
+  const auto w = static_cast<std::size_t>(width);
+  row_cdf_.resize(static_cast<std::size_t>(height) + 1);
+  for (int y = 0; y <= height; ++y) row_cosine_.push_back(std::cos(std::numbers::pi * y / height));
+  column_cdf_.resize(static_cast<std::size_t>(height) * (w + 1));
+  std::vector<double> row_sums(static_cast<std::size_t>(height));
+  std::vector<double> row(w);
+  for (int y = 0; y < height; ++y) {
+    // Mean of the bilinear interpolant over the texel: weights 1/8, 3/4, 1/8 each way. The density is
+    // positive wherever the radiance is.
+    for (int x = 0; x < width; ++x) {
+      double mean = 0.0;
+      for (int j = -1; j <= 1; ++j) {
+        for (int i = -1; i <= 1; ++i) {
+          mean += (i == 0 ? 0.75 : 0.125) * (j == 0 ? 0.75 : 0.125) * value(x + i, y + j);
+        }
+      }
+      row[static_cast<std::size_t>(x)] = mean;
+    }
+    const double sum = normalise_cdf(&column_cdf_[static_cast<std::size_t>(y) * (w + 1)], row.data(), width);
+    const auto edge = static_cast<std::size_t>(y);
+    row_sums[edge] = sum * (row_cosine_[edge] - row_cosine_[edge + 1]) * 2.0 * std::numbers::pi / width;
+  }
+  flux_ = normalise_cdf(row_cdf_.data(), row_sums.data(), height);
+}
+
+glm::vec2 EnvironmentSampler::uv_from_direction(glm::vec3 d) const {
+  // Undo the rotation about +Y, then: the centre is −Z, +X to its right.
+  const float x = cosine_ * d.x - sine_ * d.z;
+  const float z = sine_ * d.x + cosine_ * d.z;
+  const float u = 0.5F + std::atan2(x, -z) / (2.0F * kPi);
+  // acos(y) loses half its digits at the poles.
+  const float v = std::atan2(std::hypot(x, z), d.y) / kPi;
+  return {std::clamp(u, 0.0F, 1.0F), std::clamp(v, 0.0F, 1.0F)};
+}
+
+glm::vec3 EnvironmentSampler::radiance(glm::vec3 direction) const {
+  const glm::vec2 uv = uv_from_direction(direction);
+  const int width = panorama_->width;
+  const int height = panorama_->height;
+  const float x = uv.x * static_cast<float>(width) - 0.5F;
+  const float y = uv.y * static_cast<float>(height) - 0.5F;
+  const auto x0 = static_cast<int>(std::floor(x));
+  const auto y0 = static_cast<int>(std::floor(y));
+  const float fx = x - static_cast<float>(x0);
+  const float fy = y - static_cast<float>(y0);
+  const auto texel = [&](int i, int j) {
+    const float* p = panorama_->at((i + width) % width, std::clamp(j, 0, height - 1));
+    return glm::vec3(p[0], p[1], p[2]);
+  };
+  return scale_ * ((1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
+                   fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1)));
+}
+
+float EnvironmentSampler::pdf(glm::vec3 direction) const {
+  const glm::vec2 uv = uv_from_direction(direction);
+  const int width = panorama_->width;
+  const int height = panorama_->height;
+  const int x = std::min(static_cast<int>(uv.x * static_cast<float>(width)), width - 1);
+  const int y = std::min(static_cast<int>(uv.y * static_cast<float>(height)), height - 1);
+  const float* row = &column_cdf_[static_cast<std::size_t>(y) * (static_cast<std::size_t>(width) + 1)];
+  const float probability =
+      (row_cdf_[static_cast<std::size_t>(y) + 1] - row_cdf_[static_cast<std::size_t>(y)]) *
+      (row[x + 1] - row[x]);
+  // Samples are uniform in solid angle within a texel.
+  const auto edge = static_cast<std::size_t>(y);
+  const double solid_angle = (row_cosine_[edge] - row_cosine_[edge + 1]) * 2.0 * std::numbers::pi / width;
+  return static_cast<float>(probability / solid_angle);
+}
+
+glm::vec3 EnvironmentSampler::sample(glm::vec2 u) const {
+  const int width = panorama_->width;
+  const int height = panorama_->height;
+  const CdfSample row = sample_cdf(row_cdf_.data(), height, u.y);
+  const CdfSample column = sample_cdf(
+      &column_cdf_[static_cast<std::size_t>(row.index) * (static_cast<std::size_t>(width) + 1)], width, u.x);
+  const auto edge = static_cast<std::size_t>(row.index);
+  const double y = row_cosine_[edge] + row.place * (row_cosine_[edge + 1] - row_cosine_[edge]);
+  const float azimuth =
+      2.0F * kPi * ((static_cast<float>(column.index) + column.place) / static_cast<float>(width) - 0.5F);
+  const auto radius = static_cast<float>(std::sqrt(std::max(0.0, (1.0 - y) * (1.0 + y))));
+  const float x = radius * std::sin(azimuth);
+  const float z = -radius * std::cos(azimuth);
+  return glm::normalize(glm::vec3(cosine_ * x + sine_ * z, static_cast<float>(y), -sine_ * x + cosine_ * z));
+}
+
+Lights::Lights(const Scene& scene, const RayScene& rays)
+    : scene_(&scene),
+      rays_(&rays),
+      meshes_(scene.objects.size()),
+      mesh_probability_(scene.objects.size()),
+      rectangle_probability_(scene.rectangle_lights.size()) {
+  for (std::size_t i = 0; i < scene.rectangle_lights.size(); ++i) {
+    const RectangleLight& light = scene.rectangle_lights[i];
+    Rectangle r;
+    r.corner = light.corner - rays.origin();
+    r.edge_u = light.edge_u;
+    r.edge_v = light.edge_v;
+    const glm::dvec3 normal = glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v));
+    r.area = static_cast<float>(glm::length(normal));
+    r.normal = glm::vec3(glm::normalize(normal));
+    r.centre = r.corner + 0.5F * (r.edge_u + r.edge_v);
+    r.diagonal = glm::length(r.edge_u + r.edge_v);
+    r.orthogonal =
+        std::abs(glm::dot(r.edge_u, r.edge_v)) <= 1e-5F * glm::length(r.edge_u) * glm::length(r.edge_v);
+    r.radiance = light.radiance;
+    rectangles_.push_back(r);
+    add(Kind::rectangle, static_cast<int>(i), static_cast<double>(luminance(light.radiance) * r.area * kPi));
+  }
+  for (std::size_t i = 0; i < scene.point_lights.size(); ++i) {
+    const PointLight& light = scene.point_lights[i];
+    points_.push_back({light.position - rays.origin(), light.intensity});
+    add(Kind::point, static_cast<int>(i), static_cast<double>(luminance(light.intensity) * 4.0F * kPi));
+  }
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const glm::vec3 emission = scene.materials[static_cast<std::size_t>(scene.objects[i].material)].emission;
+    if (luminance(emission) <= 0.0F) continue;
+    const TriangleMesh& mesh = scene.objects[i].mesh;
+    std::vector<double> areas;
+    for (const glm::uvec3& t : mesh.triangles) {
+      const glm::dvec3 a = mesh.positions[t.x];
+      areas.push_back(0.5 * glm::length(glm::cross(glm::dvec3(mesh.positions[t.y]) - a,
+                                                   glm::dvec3(mesh.positions[t.z]) - a)));
+    }
+    meshes_[i].area_cdf.resize(areas.size() + 1);
+    meshes_[i].area = static_cast<float>(
+        normalise_cdf(meshes_[i].area_cdf.data(), areas.data(), static_cast<int>(areas.size())));
+    add(Kind::mesh, static_cast<int>(i), static_cast<double>(luminance(emission) * meshes_[i].area * kPi));
+  }
+  if (scene.environment) {
+    environment_.emplace(*scene.environment);
+    const double radius = rays.radius();
+    if (environment_->flux() > 0.0)
+      add(Kind::environment, 0, environment_->flux() * std::numbers::pi * radius * radius);
+  }
+
+  double total = 0.0;
+  for (const Light& light : lights_) total += light.power;
+  std::vector<double> shares;
+  for (Light& light : lights_) {
+    const double equal = 1.0 / static_cast<double>(lights_.size());
+    shares.push_back(total > 0.0 ? 0.5 * equal + 0.5 * light.power / total : equal);
+  }
+  cdf_.resize(lights_.size() + 1);
+  if (!lights_.empty()) normalise_cdf(cdf_.data(), shares.data(), static_cast<int>(lights_.size()));
+  for (std::size_t i = 0; i < lights_.size(); ++i) {
+    Light& light = lights_[i];
+    light.probability = cdf_[i + 1] - cdf_[i];
+    const auto index = static_cast<std::size_t>(light.index);
+    if (light.kind == Kind::mesh) mesh_probability_[index] = light.probability;
+    if (light.kind == Kind::rectangle) rectangle_probability_[index] = light.probability;
+    if (light.kind == Kind::environment) environment_probability_ = light.probability;
+  }
+}
+
+void Lights::add(Kind kind, int index, double power) {
+  if (power > 0.0) lights_.push_back({kind, index, power});
+}
+
+std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u) const {
+  if (lights_.empty()) return std::nullopt;
+  const CdfSample pick = sample_cdf(cdf_.data(), static_cast<int>(lights_.size()), u.x);
+  const Light& light = lights_[static_cast<std::size_t>(pick.index)];
+  u.x = pick.place;
+  const auto index = static_cast<std::size_t>(light.index);
+  std::optional<LightSample> sample;
+  switch (light.kind) {
+    case Kind::rectangle:
+      sample = sample_rectangle(rectangles_[index], position, u);
+      break;
+    case Kind::point: {
+      const glm::vec3 to = points_[index].position - position;
+      const float distance = glm::length(to);
+      if (distance > 0.0F)
+        sample = {to / distance, distance, points_[index].intensity / (distance * distance), 0.0F};
+      break;
+    }
+    case Kind::mesh: {
+      const Mesh& mesh = meshes_[index];
+      const TriangleMesh& source = scene_->objects[index].mesh;
+      const CdfSample t = sample_cdf(mesh.area_cdf.data(), static_cast<int>(source.triangles.size()), u.x);
+      const glm::uvec3 corner = source.triangles[static_cast<std::size_t>(t.index)];
+      const std::span<const glm::vec3> p = rays_->positions(light.index);
+      const float root = std::sqrt(t.place);
+      const float b1 = root * (1.0F - u.y);
+      const float b2 = root * u.y;
+      const glm::vec3 point = (1.0F - b1 - b2) * p[corner.x] + b1 * p[corner.y] + b2 * p[corner.z];
+      const glm::dvec3 n = glm::cross(glm::dvec3(p[corner.y]) - glm::dvec3(p[corner.x]),
+                                      glm::dvec3(p[corner.z]) - glm::dvec3(p[corner.x]));
+      const glm::vec3 to = point - position;
+      const float distance = glm::length(to);
+      const double length = glm::length(n);
+      if (!(distance > 0.0F) || !(length > 0.0)) break;
+      const glm::vec3 direction = to / distance;
+      const float cosine = -glm::dot(direction, glm::vec3(n / length));
+      if (!(cosine > 0.0F)) break;
+      const float pdf = distance * distance / (mesh.area * cosine);
+      const glm::vec3 emission =
+          scene_->materials[static_cast<std::size_t>(scene_->objects[index].material)].emission;
+      sample = {direction, distance, emission / pdf, pdf};
+      break;
+    }
+    case Kind::environment: {
+      const glm::vec3 direction = environment_->sample(u);
+      const float pdf = environment_->pdf(direction);
+      if (pdf > 0.0F) {
+        sample = {direction, std::numeric_limits<float>::infinity(), environment_->radiance(direction) / pdf,
+                  pdf};
+      }
+      break;
+    }
+  }
+  if (sample) {
+    sample->radiance /= light.probability;
+    sample->pdf *= light.probability;
+  }
+  return sample;
+}
+
+std::optional<LightSample> Lights::sample_rectangle(const Rectangle& r, glm::vec3 position,
+                                                    glm::vec2 u) const {
+  // One-sided.
+  if (!(glm::dot(position - r.corner, r.normal) > 0.0F)) return std::nullopt;
+  glm::vec3 to;
+  float pdf = 0.0F;
+  if (by_solid_angle(r.centre, r.diagonal, r.orthogonal, position)) {
+    const SphericalRectangle seen(r.corner, r.edge_u, r.edge_v, position);
+    if (!(seen.solid_angle > 0.0)) return std::nullopt;
+    to = glm::vec3(seen.sample(u));
+    pdf = static_cast<float>(1.0 / seen.solid_angle);
+  } else {
+    to = r.corner + u.x * r.edge_u + u.y * r.edge_v - position;
+  }
+  const float distance = glm::length(to);
+  if (!(distance > 0.0F)) return std::nullopt;
+  const glm::vec3 direction = to / distance;
+  if (pdf == 0.0F) {
+    const float cosine = -glm::dot(direction, r.normal);
+    if (!(cosine > 0.0F)) return std::nullopt;
+    pdf = distance * distance / (r.area * cosine);
+  }
+  return LightSample{direction, distance, r.radiance / pdf, pdf};
+}
+
+glm::vec3 Lights::environment_radiance(glm::vec3 direction) const {
+  return environment_ ? environment_->radiance(direction) : glm::vec3(0.0F);
+}
+
+float Lights::environment_pdf(glm::vec3 direction) const {
+  return environment_probability_ > 0.0F ? environment_probability_ * environment_->pdf(direction) : 0.0F;
+}
+
+glm::vec3 Lights::rectangle_radiance(int light, glm::vec3 direction) const {
+  const Rectangle& r = rectangles_[static_cast<std::size_t>(light)];
+  return glm::dot(direction, r.normal) < 0.0F ? r.radiance : glm::vec3(0.0F);
+}
+
+float Lights::rectangle_pdf(int light, glm::vec3 position, glm::vec3 direction, float distance) const {
+  const Rectangle& r = rectangles_[static_cast<std::size_t>(light)];
+  const float probability = rectangle_probability_[static_cast<std::size_t>(light)];
+  if (by_solid_angle(r.centre, r.diagonal, r.orthogonal, position)) {
+    const double solid_angle = SphericalRectangle(r.corner, r.edge_u, r.edge_v, position).solid_angle;
+    return solid_angle > 0.0 ? probability * static_cast<float>(1.0 / solid_angle) : 0.0F;
+  }
+  const float cosine = -glm::dot(direction, r.normal);
+  return cosine > 0.0F ? probability * distance * distance / (r.area * cosine) : 0.0F;
+}
+
+float Lights::mesh_pdf(int object, glm::vec3 geometric_normal, glm::vec3 direction, float distance) const {
+  const auto index = static_cast<std::size_t>(object);
+  const float cosine = -glm::dot(direction, geometric_normal);
+  if (!(cosine > 0.0F) || mesh_probability_[index] == 0.0F) return 0.0F;
+  return mesh_probability_[index] * distance * distance / (meshes_[index].area * cosine);
+}
+
+}  // namespace mirrorbake::tracing

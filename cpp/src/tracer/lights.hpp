@@ -1,0 +1,106 @@
+#pragma once
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "mirrorbake/scene/scene.hpp"
+#include "ray_scene.hpp"
+
+namespace mirrorbake::tracing {
+
+/// A direction towards a light, for next-event estimation.
+struct LightSample {
+  glm::vec3 direction{0.0F};  ///< unit
+  float distance = 0.0F;      ///< +inf for the environment
+  glm::vec3 radiance{0.0F};  ///< divided by the density: a sum over samples times the cosine gives irradiance
+  float pdf = 0.0F;          ///< density per solid angle of this direction; 0 for point lights
+};
+
+/// The environment light: bilinear lookup and sampling by luminance.
+class EnvironmentSampler {
+ public:
+  explicit EnvironmentSampler(const EnvironmentLight& light);
+
+  glm::vec3 radiance(glm::vec3 direction) const;
+  /// Density per solid angle with which `sample` takes this direction.
+  float pdf(glm::vec3 direction) const;
+  glm::vec3 sample(glm::vec2 u) const;  ///< a unit direction
+  /// ∫ luminance dω.
+  double flux() const { return flux_; }
+
+ private:
+  glm::vec2 uv_from_direction(glm::vec3 direction) const;
+
+  const Image* panorama_;
+  float scale_;
+  float cosine_;  ///< of the rotation
+  float sine_;
+  double flux_ = 0.0;
+  std::vector<double> row_cosine_;  ///< height + 1: cosines of the rows' edges to +Y
+  std::vector<float> row_cdf_;      ///< height + 1
+  std::vector<float> column_cdf_;   ///< height × (width + 1)
+};
+
+/// All lights of a scene, one of which is picked per sample with a probability that mixes equal shares with
+/// shares by emitted power.
+class Lights {
+ public:
+  Lights(const Scene& scene, const RayScene& rays);
+
+  bool empty() const { return lights_.empty(); }
+
+  /// A direction from `position` to a light; nothing if the light turns its back.
+  std::optional<LightSample> sample(glm::vec3 position, glm::vec2 u) const;
+
+  /// Radiance that a ray in `direction` finds where it leaves the scene.
+  glm::vec3 environment_radiance(glm::vec3 direction) const;
+  /// Density with which `sample` takes a direction that leaves the scene.
+  float environment_pdf(glm::vec3 direction) const;
+
+  /// What a ray finds that hits rectangle light number `light`.
+  glm::vec3 rectangle_radiance(int light, glm::vec3 direction) const;
+  /// Densities with which `sample` at `position` takes the direction of a hit on a rectangle or an emissive
+  /// mesh.
+  float rectangle_pdf(int light, glm::vec3 position, glm::vec3 direction, float distance) const;
+  float mesh_pdf(int object, glm::vec3 geometric_normal, glm::vec3 direction, float distance) const;
+
+ private:
+  enum class Kind { rectangle, point, mesh, environment };
+  struct Light {
+    Kind kind;
+    int index;  ///< into the scene's list, or of the object
+    double power;
+    float probability = 0.0F;
+  };
+  struct Rectangle {
+    glm::vec3 corner, edge_u, edge_v, normal, centre, radiance;
+    float area, diagonal;
+    bool orthogonal;
+  };
+  struct Mesh {
+    std::vector<float> area_cdf;  ///< triangles + 1, in [0,1]
+    float area = 0.0F;
+  };
+  struct Point {
+    glm::vec3 position, intensity;
+  };
+
+  void add(Kind kind, int index, double power);
+  std::optional<LightSample> sample_rectangle(const Rectangle& r, glm::vec3 position, glm::vec2 u) const;
+
+  const Scene* scene_;
+  const RayScene* rays_;
+  std::vector<Light> lights_;
+  std::vector<float> cdf_;  ///< lights + 1
+  std::vector<Rectangle> rectangles_;
+  std::vector<Point> points_;
+  std::vector<Mesh> meshes_;             ///< per object; empty unless it emits
+  std::vector<float> mesh_probability_;  ///< per object
+  std::vector<float> rectangle_probability_;
+  float environment_probability_ = 0.0F;
+  std::optional<EnvironmentSampler> environment_;
+};
+
+}  // namespace mirrorbake::tracing

@@ -1,0 +1,169 @@
+#include "ray_scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <string>
+
+#include "mirrorbake/core/error.hpp"
+
+namespace mirrorbake::tracing {
+namespace {
+
+// Objects beyond the 31st, and the lights, share the last bit of Embree's 32-bit ray masks.
+constexpr unsigned kSharedBit = 1U << 31;
+
+// Reflectors are what gets hidden most, so they are the first to get a bit of their own.
+std::vector<unsigned> assign_mask_bits(const Scene& scene) {
+  std::vector<unsigned> bits(scene.objects.size() + scene.rectangle_lights.size(), kSharedBit);
+  int next = 0;
+  for (bool specular : {true, false}) {
+    for (std::size_t i = 0; i < scene.objects.size() && next < 31; ++i) {
+      const auto material = static_cast<std::size_t>(scene.objects[i].material);
+      if (scene.materials[material].specular == specular) bits[i] = 1U << next++;
+    }
+  }
+  return bits;
+}
+
+EmbreeGeometry make_geometry(RTCDevice device, std::span<const glm::vec3> positions,
+                             std::span<const glm::uvec3> triangles, glm::vec3 origin, unsigned mask) {
+  EmbreeGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+  auto* vertices = static_cast<glm::vec3*>(rtcSetNewGeometryBuffer(
+      geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(glm::vec3), positions.size()));
+  auto* indices = static_cast<glm::uvec3*>(rtcSetNewGeometryBuffer(
+      geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(glm::uvec3), triangles.size()));
+  if (vertices == nullptr || indices == nullptr) throw Error("Embree could not allocate a mesh");
+  std::transform(positions.begin(), positions.end(), vertices, [&](glm::vec3 p) { return p - origin; });
+  std::copy(triangles.begin(), triangles.end(), indices);
+  rtcSetGeometryMask(geometry.get(), mask);
+  rtcCommitGeometry(geometry.get());
+  return geometry;
+}
+
+RTCRay to_embree(const Ray& ray, unsigned mask) {
+  RTCRay r;
+  r.org_x = ray.origin.x;
+  r.org_y = ray.origin.y;
+  r.org_z = ray.origin.z;
+  r.tnear = 0.0F;
+  r.dir_x = ray.direction.x;
+  r.dir_y = ray.direction.y;
+  r.dir_z = ray.direction.z;
+  r.time = 0.0F;
+  r.tfar = ray.max_distance;
+  r.mask = mask;
+  r.id = 0;
+  r.flags = 0;
+  return r;
+}
+
+}  // namespace
+
+RayScene::RayScene(const Scene& scene)
+    : device_(rtcNewDevice(nullptr)),
+      mask_bits_(assign_mask_bits(scene)),
+      object_count_(static_cast<int>(scene.objects.size())) {
+  if (!device_) throw Error("Embree could not be initialised");
+  masks_supported_ = rtcGetDeviceProperty(device_.get(), RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) != 0;
+
+  glm::vec3 low(std::numeric_limits<float>::max());
+  glm::vec3 high(std::numeric_limits<float>::lowest());
+  for (const Object& object : scene.objects) {
+    bounds_.push_back(bounds(object.mesh));
+    low = glm::min(low, bounds_.back().min);
+    high = glm::max(high, bounds_.back().max);
+  }
+  std::vector<std::vector<glm::vec3>> light_corners;
+  for (const RectangleLight& light : scene.rectangle_lights) {
+    const glm::vec3 c = light.corner;
+    light_corners.push_back({c, c + light.edge_u, c + light.edge_u + light.edge_v, c + light.edge_v});
+    for (glm::vec3 p : light_corners.back()) {
+      low = glm::min(low, p);
+      high = glm::max(high, p);
+    }
+  }
+  if (low.x <= high.x) {
+    // Scenes around the world's origin keep their coordinates, bit for bit.
+    const glm::vec3 centre = 0.5F * low + 0.5F * high;
+    const float extent = glm::length(high - low);
+    if (glm::length(centre) > extent) origin_ = centre;
+    radius_ = 0.5F * extent;
+  }
+  for (Bounds& b : bounds_) {
+    b.min -= origin_;
+    b.max -= origin_;
+  }
+
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const TriangleMesh& mesh = scene.objects[i].mesh;
+    geometries_.push_back(
+        make_geometry(device_.get(), mesh.positions, mesh.triangles, origin_, mask_bits_[i]));
+    const auto* buffer = static_cast<const glm::vec3*>(
+        rtcGetGeometryBufferData(geometries_.back().get(), RTC_BUFFER_TYPE_VERTEX, 0));
+    positions_.emplace_back(buffer, mesh.positions.size());
+  }
+  const glm::uvec3 halves[2] = {{0, 1, 2}, {0, 2, 3}};
+  for (const auto& corners : light_corners) {
+    geometries_.push_back(make_geometry(device_.get(), corners, halves, origin_, kSharedBit));
+  }
+  scene_ = build({});
+  all_.scene_ = scene_.get();
+}
+
+EmbreeScene RayScene::build(std::span<const int> hidden) const {
+  EmbreeScene scene(rtcNewScene(device_.get()));
+  // Without ROBUST about 1 ray in 30,000 slips between the triangles of a closed room.
+  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
+  for (std::size_t i = 0; i < geometries_.size(); ++i) {
+    if (std::find(hidden.begin(), hidden.end(), static_cast<int>(i)) != hidden.end()) continue;
+    rtcAttachGeometryByID(scene.get(), geometries_[i].get(), static_cast<unsigned>(i));
+  }
+  rtcCommitScene(scene.get());
+  if (rtcGetDeviceError(device_.get()) != RTC_ERROR_NONE) {
+    throw Error("Embree could not build its acceleration structure (out of memory?)");
+  }
+  return scene;
+}
+
+RayScene::View RayScene::without(std::span<const int> hidden) const {
+  View view = all_;
+  bool own_bits = masks_supported_;
+  for (int object : hidden) {
+    if (object < 0 || object >= object_count_) {
+      throw InvalidArgument("hidden", std::to_string(object),
+                            "object numbers below " + std::to_string(object_count_));
+    }
+    own_bits = own_bits && mask_bits_[static_cast<std::size_t>(object)] != kSharedBit;
+  }
+  if (own_bits) {
+    for (int object : hidden) view.mask_ &= ~mask_bits_[static_cast<std::size_t>(object)];
+  } else if (!hidden.empty()) {
+    view.own_ = std::shared_ptr<std::remove_pointer_t<RTCScene>>(build(hidden));
+    view.scene_ = view.own_.get();
+  }
+  return view;
+}
+
+Hit RayScene::View::intersect(const Ray& ray, Coherence coherence) const {
+  RTCRayHit query;
+  query.ray = to_embree(ray, mask_);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  intersect1(scene_, query, coherence);
+  Hit hit;
+  if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
+    hit = {query.ray.tfar, query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v};
+  }
+  return hit;
+}
+
+bool RayScene::View::occluded(const Ray& ray) const {
+  RTCRay query = to_embree(ray, mask_);
+  occluded1(scene_, query);
+  return query.tfar < 0.0F;
+}
+
+}  // namespace mirrorbake::tracing

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "world.hpp"
+
+namespace mirrorbake {
+
+struct Tracer::State {
+  State(Scene scene, const TracerOptions& options);
+
+  tracing::World world;
+
+  /// Throws InvalidArgument unless the arguments are usable.
+  void check_object(const char* argument, int object) const;
+};
+
+}  // namespace mirrorbake

@@ -1,0 +1,179 @@
+#include "surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace mirrorbake::tracing {
+namespace {
+
+// A shading normal can send the mirror direction below the geometric surface. Such a direction is raised just
+// above the horizon and the normal replaced by the half vector that reflects the view into it, so that
+// reflection, Fresnel term and the normal that is recorded belong together (as in Keller et al., The Iray
+// Light Transport Simulation and Rendering System, 2017, appendix A.3).
+constexpr float kLowestReflection = 0.01F;  // cosine to the geometric normal
+
+glm::vec3 reflect_about(glm::vec3 view, glm::vec3 n) {
+  return 2.0F * glm::dot(n, view) * n - view;
+}
+
+glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
+  if (const float c = glm::dot(n, view); c < 0.0F) n = glm::normalize(n - c * view);
+  const glm::vec3 r = reflect_about(view, n);
+  const float height = glm::dot(r, geometric);
+  const float lowest = std::min(kLowestReflection, 0.9F * glm::dot(view, geometric));
+  if (height >= lowest) return n;
+  const glm::vec3 raised = glm::normalize(r + (lowest - height) * geometric);
+  const glm::vec3 half = view + raised;
+  const float length = glm::length(half);
+  return length > 0.0F ? half / length : geometric;
+}
+
+// In double: the cross product of two edges of 1e-10 m underflows in float.
+glm::vec3 triangle_normal(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
+  const glm::dvec3 n = glm::cross(b - a, c - a);
+  const double length = glm::length(n);
+  return length > 0.0 ? glm::vec3(n / length) : glm::vec3(0.0F, 1.0F, 0.0F);
+}
+
+}  // namespace
+
+glm::vec3 texture_lookup(const Image& texture, glm::vec2 uv) {
+  const auto wrap = [](float x) { return x - std::floor(x); };
+  const float x = wrap(uv.x) * static_cast<float>(texture.width) - 0.5F;
+  const float y = (1.0F - wrap(uv.y)) * static_cast<float>(texture.height) - 0.5F;
+  const auto x0 = static_cast<int>(std::floor(x));
+  const auto y0 = static_cast<int>(std::floor(y));
+  const float fx = x - static_cast<float>(x0);
+  const float fy = y - static_cast<float>(y0);
+  const auto texel = [&](int i, int j) {
+    i = i < 0 ? i + texture.width : (i >= texture.width ? i - texture.width : i);
+    j = j < 0 ? j + texture.height : (j >= texture.height ? j - texture.height : j);
+    const float* p = texture.at(i, j);
+    return glm::vec3(p[0], p[1], p[2]);
+  };
+  return (1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
+         fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
+}
+
+Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm::vec3 ray_direction) {
+  Surface s;
+  s.object = static_cast<int>(hit.geometry);
+  s.triangle = hit.triangle;
+  s.barycentric = {hit.u, hit.v};
+  const Object& object = scene.objects[hit.geometry];
+  const TriangleMesh& mesh = object.mesh;
+  s.material = &scene.materials[static_cast<std::size_t>(object.material)];
+
+  const glm::uvec3 corner = mesh.triangles[hit.triangle];
+  const std::span<const glm::vec3> positions = rays.positions(s.object);
+  const glm::vec3 a = positions[corner.x];
+  const glm::vec3 b = positions[corner.y];
+  const glm::vec3 c = positions[corner.z];
+  const float w = 1.0F - hit.u - hit.v;
+  s.position = w * a + hit.u * b + hit.v * c;
+  // The interpolation is off by a few roundings of the largest coordinate, and so is the intersector's own
+  // arithmetic, in which the axes mix: 8 roundings cover both (tests trace from 1e-3 m to 1e5 m).
+  const glm::vec3 largest = glm::max(glm::abs(a), glm::max(glm::abs(b), glm::abs(c)));
+  s.position_error = 8.0F * 0x1p-24F * std::max(largest.x, std::max(largest.y, largest.z));
+  s.view = -ray_direction;
+
+  s.geometric_normal = triangle_normal(a, b, c);
+  s.front = glm::dot(s.geometric_normal, s.view) >= 0.0F;
+  s.normal = s.geometric_normal;
+  if (!mesh.normals.empty()) {
+    const glm::vec3 n =
+        w * mesh.normals[corner.x] + hit.u * mesh.normals[corner.y] + hit.v * mesh.normals[corner.z];
+    const float length = glm::length(n);
+    // A normal on the wrong side of its triangle is a defect of the mesh.
+    if (length > 1e-6F && glm::dot(n, s.geometric_normal) > 0.0F) s.normal = n / length;
+  }
+  if (!s.front) {
+    s.geometric_normal = -s.geometric_normal;
+    s.normal = -s.normal;
+  } else {
+    s.emission = s.material->emission;
+  }
+
+  s.albedo = s.material->albedo;
+  if (s.material->albedo_texture >= 0 && s.albedo != glm::vec3(0.0F)) {
+    glm::vec2 uv(0.0F);
+    if (!mesh.uvs.empty())
+      uv = w * mesh.uvs[corner.x] + hit.u * mesh.uvs[corner.y] + hit.v * mesh.uvs[corner.z];
+    s.albedo *= texture_lookup(scene.textures[static_cast<std::size_t>(s.material->albedo_texture)], uv);
+  }
+  if (s.material->specular) {
+    s.normal = bend_normal(s.view, s.normal, s.geometric_normal);
+    s.reflection = glm::normalize(reflect_about(s.view, s.normal));
+    s.fresnel = evaluate(s.material->fresnel, glm::dot(s.normal, s.view));
+    if (s.material->layers == LayerModel::coated) s.albedo *= 1.0F - s.fresnel;
+  }
+  return s;
+}
+
+// Pharr, Jakob, Humphreys, Physically Based Rendering, 3rd ed., §3.9.5.
+glm::vec3 offset_origin(const Surface& surface, glm::vec3 direction) {
+  const glm::vec3 n = surface.geometric_normal;
+  const float distance = surface.position_error * (std::abs(n.x) + std::abs(n.y) + std::abs(n.z));
+  const glm::vec3 offset = glm::dot(n, direction) >= 0.0F ? distance * n : -distance * n;
+  glm::vec3 origin = surface.position + offset;
+  for (int i = 0; i < 3; ++i) {
+    if (offset[i] > 0.0F) origin[i] = std::nextafter(origin[i], std::numeric_limits<float>::infinity());
+    if (offset[i] < 0.0F) origin[i] = std::nextafter(origin[i], -std::numeric_limits<float>::infinity());
+  }
+  return origin;
+}
+
+SurfaceDifferential surface_differential(const Scene& scene, const RayScene& rays, const Surface& surface,
+                                         float distance, glm::vec3 ddirection) {
+  // Transfer: the point slides in the plane of the triangle. Near the silhouette its speed grows without
+  // limit; there the surface curves away before it is reached, so the cosine is kept above a tenth.
+  const glm::vec3 d = -surface.view;
+  const glm::vec3 g = surface.geometric_normal;
+  const float cosine = std::min(glm::dot(d, g), -0.1F);
+  const glm::vec3 travel = distance * ddirection;
+  const float along = glm::dot(travel, g);
+  SurfaceDifferential result;
+  result.position = travel - (along / cosine) * d;
+  result.position -= glm::dot(result.position, g) * g;
+
+  // Reflection: r = d − 2 (d·n) n, with the normal's change from the change of the barycentric coordinates.
+  const TriangleMesh& mesh = scene.objects[static_cast<std::size_t>(surface.object)].mesh;
+  glm::vec3 dnormal(0.0F);
+  if (!mesh.normals.empty()) {
+    const glm::uvec3 corner = mesh.triangles[surface.triangle];
+    const std::span<const glm::vec3> positions = rays.positions(surface.object);
+    const glm::dvec3 e1 = glm::dvec3(positions[corner.y]) - glm::dvec3(positions[corner.x]);
+    const glm::dvec3 e2 = glm::dvec3(positions[corner.z]) - glm::dvec3(positions[corner.x]);
+    const glm::dvec3 dp = result.position;
+    const double e11 = glm::dot(e1, e1);
+    const double e12 = glm::dot(e1, e2);
+    const double e22 = glm::dot(e2, e2);
+    const double determinant = e11 * e22 - e12 * e12;
+    if (determinant > 0.0) {
+      const double p1 = glm::dot(dp, e1);
+      const double p2 = glm::dot(dp, e2);
+      const auto du = static_cast<float>((p1 * e22 - p2 * e12) / determinant);
+      const auto dv = static_cast<float>((p2 * e11 - p1 * e12) / determinant);
+      const glm::vec3 n0 = mesh.normals[corner.x];
+      const glm::vec3 n1 = mesh.normals[corner.y];
+      const glm::vec3 n2 = mesh.normals[corner.z];
+      const glm::vec3 n = (1.0F - surface.barycentric.x - surface.barycentric.y) * n0 +
+                          surface.barycentric.x * n1 + surface.barycentric.y * n2;
+      const float length = std::max(glm::length(n), 1e-6F);
+      const glm::vec3 change = ((n1 - n0) * du + (n2 - n0) * dv) / length;
+      dnormal = (surface.front ? 1.0F : -1.0F) * (change - glm::dot(change, surface.normal) * surface.normal);
+    }
+  }
+  const glm::vec3 n = surface.normal;
+  result.reflection =
+      ddirection - 2.0F * (glm::dot(d, n) * dnormal + (glm::dot(ddirection, n) + glm::dot(d, dnormal)) * n);
+  // Directions differ by 2 at most; a longer differential is an artefact of the linear extrapolation.
+  const float length = glm::length(result.reflection);
+  if (!(length <= 2.0F))
+    result.reflection = length < 1e30F ? result.reflection * (2.0F / length) : glm::vec3(0.0F);
+  return result;
+}
+
+}  // namespace mirrorbake::tracing

@@ -1,0 +1,383 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/projection/cube.hpp"
+#include "scenes.hpp"
+
+namespace mirrorbake {
+namespace {
+
+using test::add_object;
+using test::constant_environment;
+using test::matte;
+using test::mirror;
+
+constexpr double kPi = std::numbers::pi;
+
+TracerOptions indirect(IndirectLight light) {
+  TracerOptions options;
+  options.indirect = light;
+  return options;
+}
+
+// Mean and standard error of the mean over the pixels, which are independent estimates of the same value.
+struct Estimate {
+  double mean;
+  double error;
+};
+Estimate estimate(const Image& image, int channel = 0) {
+  double sum = 0;
+  double squares = 0;
+  const int count = image.width * image.height;
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const double v = image.at(x, y)[channel];
+      sum += v;
+      squares += v * v;
+    }
+  }
+  const double mean = sum / count;
+  return {mean, std::sqrt(std::max(0.0, squares / count - mean * mean) / count)};
+}
+
+// A camera that looks at a spot of a horizontal floor: all pixels see nearly the same point.
+Camera spot(glm::vec3 point) {
+  Camera camera;
+  camera.eye = point + glm::vec3(0.4F, 1.0F, 0.3F);
+  camera.target = point;
+  camera.vertical_fov_degrees = 0.01F;
+  camera.width = camera.height = 64;
+  return camera;
+}
+
+TriangleMesh floor_at(float y, float half = 3.0F) {
+  return make_rectangle({-half, y, half}, {2 * half, 0, 0}, {0, 0, -2 * half});
+}
+
+TEST(Light, PointLightFallsOffWithTheSquareOfTheDistance) {
+  Scene scene;
+  add_object(scene, floor_at(0.0F), matte(glm::vec3(0.8F)));
+  scene.point_lights.push_back({{0.0F, 2.0F, 0.0F}, glm::vec3(5.0F)});
+  const Tracer tracer(scene, indirect(IndirectLight::none));
+  TraceOptions options;
+  options.samples_per_pixel = 1;
+  for (float x : {0.0F, 1.0F, 2.5F}) {
+    const Estimate got = estimate(tracer.trace_beauty(spot({x, 0, 0}), options));
+    const double d2 = x * x + 4.0;
+    const double expected = 0.8 / kPi * 5.0 * (2.0 / std::sqrt(d2)) / d2;
+    // No noise: what is left is the size of the spot, 1e-4 m.
+    EXPECT_NEAR(got.mean, expected, 2e-4 * expected);
+  }
+}
+
+// Form factor of a rectangle parallel to the receiver, one corner straight above the point (Howell, A Catalog
+// of Radiation Heat Transfer Configuration Factors, B-3).
+double corner_form_factor(double a, double b, double c) {
+  const double x = a / c;
+  const double y = b / c;
+  return (x / std::sqrt(1 + x * x) * std::atan(y / std::sqrt(1 + x * x)) +
+          y / std::sqrt(1 + y * y) * std::atan(x / std::sqrt(1 + y * y))) /
+         (2 * kPi);
+}
+
+TEST(Light, RectangleLightGivesItsFormFactor) {
+  struct Case {
+    float height, width, depth;
+  };
+  // Close (sampled by solid angle) and far away (by area).
+  for (const Case c : {Case{0.3F, 1.0F, 2.0F}, Case{2.0F, 1.0F, 1.5F}, Case{40.0F, 1.0F, 1.0F}}) {
+    Scene scene;
+    add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+    RectangleLight light;
+    light.corner = {0, c.height, 0};
+    light.edge_u = {c.width, 0, 0};
+    light.edge_v = {0, 0, c.depth};
+    light.radiance = glm::vec3(3.0F, 2.0F, 1.0F);
+    scene.rectangle_lights.push_back(light);
+    const double expected = 3.0 * corner_form_factor(c.width, c.depth, c.height);
+    for (IndirectLight mode : {IndirectLight::none, IndirectLight::path}) {
+      const Tracer tracer(scene, indirect(mode));
+      Camera camera = spot(glm::vec3(0.0F));
+      camera.eye = {-0.4F, 0.2F, -0.3F};
+      const Estimate got = estimate(tracer.trace_beauty(camera, {}));
+      EXPECT_NEAR(got.mean, expected, 4.0 * got.error + 1e-4 * expected) << "height " << c.height;
+      EXPECT_LT(got.error, 0.01 * expected);
+    }
+  }
+}
+
+TEST(Light, RectangleLightIsOneSided) {
+  Scene scene;
+  add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+  RectangleLight light;
+  light.corner = {-0.5F, 1.0F, -0.5F};
+  light.edge_u = {0, 0, 1};
+  light.edge_v = {1, 0, 0};  // u × v points up
+  scene.rectangle_lights.push_back(light);
+  for (IndirectLight mode : {IndirectLight::none, IndirectLight::path}) {
+    const Tracer tracer(scene, indirect(mode));
+    EXPECT_EQ(estimate(tracer.trace_beauty(spot({1, 0, 0}), {})).mean, 0.0);
+    Camera from_above;
+    from_above.eye = {0, 5, 0};
+    from_above.target = {0, 1, 0};
+    from_above.up = {0, 0, 1};
+    from_above.vertical_fov_degrees = 1.0F;
+    from_above.width = from_above.height = 4;
+    EXPECT_EQ(estimate(tracer.trace_beauty(from_above, {})).mean, 1.0);
+    from_above.eye = {0, 0.5F, 0};
+    EXPECT_EQ(estimate(tracer.trace_beauty(from_above, {})).mean, 0.0);
+  }
+}
+
+// A mesh light of the same shape must give what the rectangle light gives.
+TEST(Light, EmissiveMeshMatchesRectangleLight) {
+  Scene scene;
+  add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+  Material glow = matte(glm::vec3(0.0F));
+  glow.emission = glm::vec3(3.0F);
+  add_object(scene, make_rectangle({0, 1.0F, 0}, {1, 0, 0}, {0, 0, 1.5F}), glow);
+  const double expected = 3.0 * corner_form_factor(1.0, 1.5, 1.0);
+  for (IndirectLight mode : {IndirectLight::none, IndirectLight::path}) {
+    const Tracer tracer(scene, indirect(mode));
+    Camera camera = spot(glm::vec3(0.0F));
+    camera.eye = {-0.4F, 0.2F, -0.3F};
+    const Estimate got = estimate(tracer.trace_beauty(camera, {}));
+    EXPECT_NEAR(got.mean, expected, 4.0 * got.error + 1e-4 * expected);
+    EXPECT_LT(got.error, 0.01 * expected);
+  }
+}
+
+// White furnace: a convex body of albedo a under radiance 1 from everywhere reflects a.
+TEST(Light, ConvexBodyUnderAConstantSkyReflectsItsAlbedo) {
+  for (IndirectLight mode : {IndirectLight::none, IndirectLight::cached, IndirectLight::path}) {
+    for (float albedo : {0.0F, 0.3F, 1.0F}) {
+      Scene scene;
+      add_object(scene, make_box(glm::vec3(-1.0F), glm::vec3(1.0F)), matte(glm::vec3(albedo)));
+      scene.environment = constant_environment(1.0F);
+      const Tracer tracer(scene, indirect(mode));
+      Camera camera;
+      camera.eye = {0.3F, 0.5F, 4.0F};
+      camera.vertical_fov_degrees = 5.0F;
+      camera.width = camera.height = 64;
+      TraceOptions options;
+      options.samples_per_pixel = 64;
+      const Estimate got = estimate(tracer.trace_beauty(camera, options));
+      EXPECT_NEAR(got.mean, albedo, 4.0 * got.error + 1e-5) << "mode " << static_cast<int>(mode);
+      EXPECT_LT(got.error, 0.01);
+    }
+  }
+}
+
+// Closed furnace: walls that emit e and reflect a hold the radiance e (1 + a + a² + …).
+TEST(Light, ClosedFurnaceSumsTheGeometricSeries) {
+  const float emission = 0.7F;
+  const double albedo = 0.5;
+  Scene scene;
+  Material wall = matte(glm::vec3(static_cast<float>(albedo)));
+  wall.emission = glm::vec3(emission);
+  TriangleMesh sphere = make_sphere(glm::vec3(0.0F), 1.0F, 32);
+  for (glm::uvec3& t : sphere.triangles) std::swap(t.y, t.z);  // facing inwards
+  sphere.normals.clear();  // flat: interpolated normals lose what lies between them and the facets
+  add_object(scene, sphere, wall);
+  Camera camera;
+  camera.eye = {0.1F, 0.2F, 0.3F};
+  camera.target = {0, 0, -1};
+  camera.width = camera.height = 32;
+  TraceOptions options;
+  options.samples_per_pixel = 64;
+  options.max_diffuse_depth = 3;
+  {
+    // Next-event estimation adds the bounce that ends the path: 1 + 3 diffuse bounces in all.
+    double expected = emission;
+    for (int i = 1; i <= 4; ++i) expected += emission * std::pow(albedo, i);
+    const Tracer tracer(scene, indirect(IndirectLight::path));
+    const Estimate got = estimate(tracer.trace_beauty(camera, options));
+    EXPECT_NEAR(got.mean, expected, 4.0 * got.error + 1e-4);
+    EXPECT_LT(got.error, 0.01);
+  }
+  {
+    // The cache follows its default three bounces, after the direct light.
+    double expected = emission;
+    for (int i = 1; i <= 4; ++i) expected += emission * std::pow(albedo, i);
+    const Tracer tracer(scene, indirect(IndirectLight::cached));
+    const Estimate got = estimate(tracer.trace_beauty(camera, options));
+    // 256 rays at each corner: the cache's own noise is common to neighbouring pixels.
+    EXPECT_NEAR(got.mean, expected, 0.01);
+  }
+}
+
+// Panorama with one bright texel: the direction convention, and that importance sampling knows of the
+// rotation.
+TEST(Light, EnvironmentFollowsTheLatitudeLongitudeConvention) {
+  const auto look = [](const Tracer& tracer, glm::vec3 direction) {
+    Camera camera;
+    camera.eye = {0, 50, 0};
+    camera.target = camera.eye + direction;
+    camera.vertical_fov_degrees = 0.1F;
+    camera.width = camera.height = 2;
+    return tracer.trace_beauty(camera, {}).at(0, 0)[0];
+  };
+  Scene scene;
+  add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+  EnvironmentLight light;
+  light.panorama = Image(64, 32, {"R", "G", "B"});
+  // Right of the centre by a quarter of the width, and above the middle by a quarter of the height: +X and
+  // up.
+  for (int c = 0; c < 3; ++c) light.panorama.at(48, 8)[c] = 100.0F;
+  scene.environment = light;
+  // Centre of texel (48, 8).
+  const double longitude = 2 * kPi * (48.5 / 64 - 0.5);
+  const double latitude = kPi * (0.5 - 8.5 / 32);
+  const auto towards = [&](double rotation) {
+    // Seen from above with +X right and −Z up, counter-clockwise is from +X to −Z.
+    const double a = longitude - rotation;
+    return glm::vec3(std::cos(latitude) * std::sin(a), std::sin(latitude), -std::cos(latitude) * std::cos(a));
+  };
+  for (float degrees : {0.0F, 90.0F, -33.0F}) {
+    scene.environment->rotation_degrees = degrees;
+    const Tracer tracer(scene, indirect(IndirectLight::none));
+    const glm::vec3 bright = towards(degrees * kPi / 180);
+    EXPECT_NEAR(look(tracer, bright), 100.0F, 2.0F);  // the view is not quite on the texel's centre
+    EXPECT_EQ(look(tracer, -bright), 0.0F);
+    // Bilinear interpolation spreads the texel's radiance over its neighbours, and its integral is about that
+    // of the texel: irradiance = 100 Ω sin(latitude) within the change of the cosine over a texel.
+    const double solid_angle = 2 * kPi / 64 * (std::cos(8 * kPi / 32) - std::cos(9 * kPi / 32));
+    const Estimate got = estimate(tracer.trace_beauty(spot(glm::vec3(0.0F)), {}));
+    EXPECT_NEAR(got.mean, 100.0 * solid_angle * std::sin(latitude) / kPi, 0.01 * got.mean);
+    EXPECT_LT(got.error, 0.01 * got.mean);
+  }
+}
+
+// The two ways to follow diffuse light agree where the cache can be exact: a finely cut open box.
+TEST(Light, CachedAndPathIndirectLightAgree) {
+  Scene scene;
+  const auto wall = [&](glm::vec3 corner, glm::vec3 u, glm::vec3 v, glm::vec3 albedo) {
+    constexpr int kCells = 12;
+    TriangleMesh mesh;
+    for (int j = 0; j <= kCells; ++j) {
+      for (int i = 0; i <= kCells; ++i) {
+        mesh.positions.push_back(corner + u * (static_cast<float>(i) / kCells) +
+                                 v * (static_cast<float>(j) / kCells));
+      }
+    }
+    for (unsigned j = 0; j < kCells; ++j) {
+      for (unsigned i = 0; i < kCells; ++i) {
+        const unsigned a = j * (kCells + 1) + i;
+        mesh.triangles.push_back({a, a + 1, a + kCells + 2});
+        mesh.triangles.push_back({a, a + kCells + 2, a + kCells + 1});
+      }
+    }
+    add_object(scene, mesh, matte(albedo));
+  };
+  wall({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, glm::vec3(0.7F));              // floor
+  wall({-1, 0, -1}, {2, 0, 0}, {0, 2, 0}, glm::vec3(0.7F, 0.5F, 0.3F));  // back
+  wall({-1, 0, 1}, {0, 0, -2}, {0, 2, 0}, glm::vec3(0.8F, 0.1F, 0.1F));  // left
+  RectangleLight light;
+  light.corner = {0.2F, 1.9F, 0.2F};
+  light.edge_u = {0.5F, 0, 0};
+  light.edge_v = {0, 0, 0.5F};
+  light.radiance = glm::vec3(20.0F);
+  scene.rectangle_lights.push_back(light);
+  TracerOptions cached = indirect(IndirectLight::cached);
+  cached.cache_bounces = 4;
+  cached.cache_rays = 512;
+  const Tracer with_cache(scene, cached);
+  const Tracer with_paths(scene, indirect(IndirectLight::path));
+  const Tracer direct_only(scene, indirect(IndirectLight::none));
+  for (glm::vec3 point : {glm::vec3(-0.6F, 0, -0.5F), glm::vec3(0.5F, 0, 0.1F)}) {
+    for (int channel = 0; channel < 3; ++channel) {
+      const double a = estimate(with_cache.trace_beauty(spot(point), {}), channel).mean;
+      const Estimate b = estimate(with_paths.trace_beauty(spot(point), {}), channel);
+      const double c = estimate(direct_only.trace_beauty(spot(point), {}), channel).mean;
+      // 3 % of the indirect light for the cache's noise at 512 rays and its interpolation over a sixth of a
+      // metre.
+      EXPECT_NEAR(a, b.mean, 4 * b.error + 0.03 * (b.mean - c)) << channel;
+      EXPECT_GT(b.mean - c, 0.02 * b.mean);
+    }
+  }
+}
+
+TEST(Light, CaptureSeesTheSkyWithItsConventionAndSkipsWhatIsHidden) {
+  Scene scene;
+  const int ball = add_object(scene, make_sphere(glm::vec3(0.0F), 0.5F), mirror(glm::vec3(1.0F)));
+  const int floor = add_object(scene, floor_at(-1.0F, 100.0F), matte(glm::vec3(0.5F)));
+  EnvironmentLight sky;
+  sky.panorama = Image(64, 32, {"R", "G", "B"});
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      // Smooth functions of the direction: 1 + x and 1 + z.
+      const double longitude = 2 * kPi * ((x + 0.5) / 64 - 0.5);
+      const double latitude = kPi * (0.5 - (y + 0.5) / 32);
+      sky.panorama.at(x, y)[0] = static_cast<float>(1 + std::cos(latitude) * std::sin(longitude));
+      sky.panorama.at(x, y)[1] = static_cast<float>(1 - std::cos(latitude) * std::cos(longitude));
+    }
+  }
+  scene.environment = sky;
+  const Tracer tracer(scene, indirect(IndirectLight::none));
+  const std::array<int, 2> hidden{ball, floor};
+  const int size = 16;
+  const Image cube = tracer.capture_cube(glm::vec3(0.0F), size, hidden, {});
+  ASSERT_EQ(cube.height, 6 * size);
+  for (int row = 0; row < 6 * size; ++row) {
+    for (int x = 0; x < size; ++x) {
+      const glm::vec3 d = glm::normalize(direction_from_cube(
+          row / size, (static_cast<float>(x) + 0.5F) / size, (static_cast<float>(row % size) + 0.5F) / size));
+      EXPECT_NEAR(cube.at(x, row)[0], 1.0F + d.x, 0.02F);
+      EXPECT_NEAR(cube.at(x, row)[1], 1.0F + d.z, 0.02F);
+    }
+  }
+  // With the floor, the lower half is lit from above: half of the sky's irradiance at most.
+  const Image with_floor = tracer.capture_cube(glm::vec3(0.0F), size, {&ball, 1}, {});
+  EXPECT_NEAR(with_floor.at(8, 3 * size + 8)[0], 0.5F, 0.1F);
+  EXPECT_EQ(with_floor.at(8, 2 * size + 8)[0], cube.at(8, 2 * size + 8)[0]);
+}
+
+TEST(Light, VertexIrradianceOfAConstantSkyIsPi) {
+  Scene scene;
+  const int box = add_object(scene, make_sphere(glm::vec3(0.0F), 1.0F, 16), matte(glm::vec3(0.5F)));
+  const TriangleMesh& mesh = scene.objects[0].mesh;
+  std::vector<bool> used(mesh.positions.size(), false);  // the poles have vertices without a triangle
+  for (const glm::uvec3& t : mesh.triangles) used[t.x] = used[t.y] = used[t.z] = true;
+  scene.environment = constant_environment(1.0F);
+  for (IndirectLight mode : {IndirectLight::none, IndirectLight::cached, IndirectLight::path}) {
+    const Tracer tracer(scene, indirect(mode));
+    const std::vector<glm::vec3> e = tracer.vertex_irradiance(box, 1024, 1);
+    ASSERT_EQ(e.size(), mesh.positions.size());
+    double sum = 0;
+    for (std::size_t i = 0; i < e.size(); ++i) {
+      // Facets of 2π/16 rad hide up to 2 % of the sky above the interpolated normals' horizon.
+      EXPECT_NEAR(e[i].x, used[i] ? kPi : 0.0, 0.1 * kPi);
+      sum += e[i].x;
+    }
+    EXPECT_NEAR(sum / static_cast<double>(std::count(used.begin(), used.end(), true)), kPi, 0.03 * kPi);
+  }
+}
+
+TEST(Light, SameBitsOnAnyNumberOfThreads) {
+  Scene scene = test::small_room();
+  add_object(scene, make_sphere({0, 1, 0}, 0.7F), mirror(glm::vec3(0.9F), glm::vec3(0.1F)));
+  Camera camera;
+  camera.eye = {0, 2, 1.9F};
+  camera.target = {0, 1, 0};
+  camera.vertical_fov_degrees = 70.0F;
+  camera.width = camera.height = 32;
+  for (IndirectLight mode : {IndirectLight::cached, IndirectLight::path}) {
+    TracerOptions options = indirect(mode);
+    options.cache_rays = 64;
+    const Image many = Tracer(scene, options).trace_beauty(camera, {});
+    const ThreadLimit one(1);
+    EXPECT_EQ(Tracer(scene, options).trace_beauty(camera, {}).pixels, many.pixels);
+    TraceOptions other_seed;
+    other_seed.seed = 1;
+    EXPECT_NE(Tracer(scene, options).trace_beauty(camera, other_seed).pixels, many.pixels);
+  }
+}
+
+}  // namespace
+}  // namespace mirrorbake

@@ -21,6 +21,41 @@ function(mirrorbake_add_module name)
   set_property(GLOBAL APPEND PROPERTY MIRRORBAKE_MODULES ${target})
 endfunction()
 
+# mirrorbake_add_isa_sources(MODULE SOURCES ...)
+#
+# Compiles the sources once per instruction set into the module, with MIRRORBAKE_ISA set to the name of the
+# level (core/isa.hpp): they keep everything they define in a namespace of that name, include no header that
+# defines inline functions outside it (the linker would be free to keep the AVX-512 copy for everyone), and
+# the module picks one at run time. -O3 vectorises; -fno-trapping-math only allows both sides of a
+# condition to be evaluated; neither changes a value.
+function(mirrorbake_add_isa_sources module)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
+  set(levels baseline)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    list(APPEND levels sse42 avx2 avx512)
+    target_compile_definitions(mirrorbake_${module} PRIVATE MIRRORBAKE_HAS_X86_LEVELS=1)
+  endif()
+  set(flags_sse42 -msse4.2)
+  set(flags_avx2 -mavx2 -mtune=haswell)
+  set(flags_avx512 -mavx512f -mavx512bw -mavx512dq -mavx512vl -mprefer-vector-width=512 -mtune=skylake-avx512)
+  foreach(level IN LISTS levels)
+    set(object mirrorbake_${module}_${level})
+    add_library(${object} OBJECT ${arg_SOURCES})
+    target_compile_features(${object} PRIVATE cxx_std_20)
+    target_include_directories(${object} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/cpp/include)
+    target_compile_definitions(${object} PRIVATE MIRRORBAKE_ISA=${level})
+    target_link_libraries(${object} PRIVATE mirrorbake_build_flags)
+    target_compile_options(${object} PRIVATE ${flags_${level}})
+    if(NOT MIRRORBAKE_SANITIZERS AND NOT MIRRORBAKE_COVERAGE)
+      # GCC would follow each side of a selection as a path of its own through the rest of a formula and blend at
+      # every step; a third faster without.
+      target_compile_options(${object} PRIVATE -O3 -fno-trapping-math
+        $<$<CXX_COMPILER_ID:GNU>:-fno-thread-jumps -fno-ssa-phiopt>)
+    endif()
+    target_sources(mirrorbake_${module} PRIVATE $<TARGET_OBJECTS:${object}>)
+  endforeach()
+endfunction()
+
 # mirrorbake_add_test(MODULE SOURCES ... [DEPENDS module...]): one GoogleTest executable test_MODULE.
 function(mirrorbake_add_test module)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;DEPENDS;PRIVATE")

@@ -36,6 +36,8 @@ void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t, std::size_t)>& body) {
   grain = std::max<std::size_t>(grain, 1);
   const std::size_t chunks = (count + grain - 1) / grain;
+  if (chunks == 0) return;
+  if (chunks == 1) return body(0, count);
   tbb::parallel_for(std::size_t{0}, chunks,
                     [&](std::size_t chunk) { body(chunk * grain, std::min(count, (chunk + 1) * grain)); });
 }

@@ -4,7 +4,7 @@
 
 /// Instruction sets. One binary carries its hot loops several times over, compiled for each level below, and
 /// picks the best one that the processor has. Every level gives the same bits: the loops use no fused
-/// multiply-add, no approximate reciprocal and no reordering (docs/adr/0004-isa-dispatch.md).
+/// multiply-add, no approximate reciprocal and no reordering (docs/adr/0020).
 namespace mirrorbake {
 
 /// In rising order; `baseline` is whatever the compiler targets by default (SSE2 on x86-64, NEON on ARM64).

@@ -7,6 +7,7 @@ void bind_core(nb::module_& m);
 void bind_proxy(nb::module_& m);
 void bind_image(nb::module_& m);
 void bind_scene(nb::module_& m);
+void bind_tracer(nb::module_& m);
 void bind_inference(nb::module_& m);
 void bind_pem(nb::module_& m);
 
@@ -19,6 +20,7 @@ NB_MODULE(_core, m) {
   bind_proxy(m);
   bind_image(m);
   bind_scene(m);
+  bind_tracer(m);
   bind_inference(m);
   bind_pem(m);
 }

@@ -436,6 +436,287 @@ def make_room() -> Scene:
     which is not part of it, stands there.
     """
 
+class Camera:
+    """A pinhole camera. Pixel (0,0) is the top left one."""
+
+    def __init__(self, eye: Sequence[float], target: Sequence[float], up: Sequence[float] = (0.0, 1.0, 0.0), vertical_fov_degrees: float = 40.0, width: int = 512, height: int = 512) -> None: ...
+
+    @property
+    def eye(self) -> Sequence[float]: ...
+
+    @eye.setter
+    def eye(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def target(self) -> Sequence[float]: ...
+
+    @target.setter
+    def target(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def up(self) -> Sequence[float]: ...
+
+    @up.setter
+    def up(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def vertical_fov_degrees(self) -> float:
+        """In (0, 180)."""
+
+    @vertical_fov_degrees.setter
+    def vertical_fov_degrees(self, arg: float, /) -> None: ...
+
+    @property
+    def width(self) -> int:
+        """Pixels, 1 to 16384."""
+
+    @width.setter
+    def width(self, arg: int, /) -> None: ...
+
+    @property
+    def height(self) -> int:
+        """Pixels, 1 to 16384."""
+
+    @height.setter
+    def height(self, arg: int, /) -> None: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __repr__(self) -> str: ...
+
+class IndirectLight(enum.Enum):
+    """
+    How light that reaches a diffuse surface by way of other diffuse surfaces is found.
+    """
+
+    none = 0
+    """Not at all."""
+
+    cached = 1
+    """Gathered once per vertex: noise-free, blurred over a triangle."""
+
+    path = 2
+    """Random paths: unbiased, noisy."""
+
+class TracerOptions:
+    """What is decided once per scene."""
+
+    def __init__(self, *, indirect: IndirectLight = IndirectLight.cached, cache_rays: int = 256, cache_bounces: int = 3, seed: int = 0) -> None: ...
+
+    @property
+    def indirect(self) -> IndirectLight: ...
+
+    @indirect.setter
+    def indirect(self, arg: IndirectLight, /) -> None: ...
+
+    @property
+    def cache_rays(self) -> int:
+        """Gather rays per vertex and bounce, 1 to 65536."""
+
+    @cache_rays.setter
+    def cache_rays(self, arg: int, /) -> None: ...
+
+    @property
+    def cache_bounces(self) -> int:
+        """Diffuse bounces of the cache, 1 to 16."""
+
+    @cache_bounces.setter
+    def cache_bounces(self, arg: int, /) -> None: ...
+
+    @property
+    def seed(self) -> int:
+        """Of the cache."""
+
+    @seed.setter
+    def seed(self, arg: int, /) -> None: ...
+
+class TraceOptions:
+    """What is decided per image."""
+
+    def __init__(self, *, samples_per_pixel: int = 16, max_specular_depth: int = 8, max_diffuse_depth: int = 4, seed: int = 0) -> None: ...
+
+    @property
+    def samples_per_pixel(self) -> int:
+        """1 to 65536."""
+
+    @samples_per_pixel.setter
+    def samples_per_pixel(self, arg: int, /) -> None: ...
+
+    @property
+    def max_specular_depth(self) -> int:
+        """Mirror bounces after the first, 0 to 64."""
+
+    @max_specular_depth.setter
+    def max_specular_depth(self, arg: int, /) -> None: ...
+
+    @property
+    def max_diffuse_depth(self) -> int:
+        """Diffuse bounces of IndirectLight.path, 0 to 64."""
+
+    @max_diffuse_depth.setter
+    def max_diffuse_depth(self, arg: int, /) -> None: ...
+
+    @property
+    def seed(self) -> int: ...
+
+    @seed.setter
+    def seed(self, arg: int, /) -> None: ...
+
+class SurfaceSamples:
+    """
+    Where the samples of an image's pixels first meet the reflector: one entry per sample that sees it, ordered by
+    pixel, then by sample. All arrays are read-only views; the last four are empty when no light was traced.
+    """
+
+    @property
+    def width(self) -> int:
+        """Of the image, pixels."""
+
+    @property
+    def height(self) -> int:
+        """Of the image, pixels."""
+
+    @property
+    def samples_per_pixel(self) -> int: ...
+
+    def __len__(self) -> int: ...
+
+    @property
+    def pixel(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
+        """(n,) uint32: y * width + x."""
+
+    @property
+    def part(self) -> Annotated[NDArray[numpy.uint16], dict(writable=False)]:
+        """(n,) uint16: part of the reflector."""
+
+    @property
+    def triangle(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
+        """(n,) uint32: triangle of the reflector's mesh."""
+
+    @property
+    def barycentric(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 2): weights of the triangle's second and third vertex."""
+
+    @property
+    def position(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): world space, metres."""
+
+    @property
+    def normal(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): unit shading normal, towards the eye."""
+
+    @property
+    def reflection(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): unit direction r = 2(n·v)n - v."""
+
+    @property
+    def dposition_dx(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): change of `position` per pixel to the right."""
+
+    @property
+    def dposition_dy(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): change of `position` per pixel down."""
+
+    @property
+    def dreflection_dx(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): change of `reflection` per pixel to the right."""
+
+    @property
+    def dreflection_dy(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): change of `reflection` per pixel down."""
+
+    @property
+    def fresnel(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): Fresnel reflectance F of the first bounce."""
+
+    @property
+    def albedo(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): diffuse albedo, times (1 - F) under a coat."""
+
+    @property
+    def diffuse(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): radiance D that the body reflects and emits."""
+
+    @property
+    def local(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """
+        (n, 4): incident radiance from the reflector itself, premultiplied, and alpha.
+        """
+
+    @property
+    def distant(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): incident radiance through the reflector."""
+
+    @property
+    def hit_distance(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """
+        (n,): metres along `reflection` to what the distant ray hits; inf: nothing.
+        """
+
+class LayerTrace:
+    """The layers of one reflector in one view."""
+
+    @property
+    def layers(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """
+        (height, width, channels) float32, read-only: means over each pixel's samples.
+        """
+
+    @property
+    def channels(self) -> list[str]:
+        """Names of the channels of `layers`."""
+
+    @property
+    def samples(self) -> SurfaceSamples:
+        """The samples that see the reflector, with the traced light."""
+
+    @property
+    def sample_beauty(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """
+        (n, 3): beauty value of each entry of `samples`, by the beauty integrator.
+        """
+
+class Tracer:
+    """
+    A scene made ready for tracing. Same arguments give the same bits on any number of threads.
+    """
+
+    def __init__(self, scene: Scene, options: TracerOptions = ...) -> None:
+        """
+        Copies the scene, builds the acceleration structure and, with IndirectLight.cached, gathers the cache.
+        """
+
+    @property
+    def scene(self) -> Scene: ...
+
+    def trace_beauty(self, camera: Camera, options: TraceOptions = ...) -> NDArray[numpy.float32]:
+        """Image of everything: (height, width, 3) float32 radiance."""
+
+    def trace_layers(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> LayerTrace:
+        """Layers of object number `reflector`, whose material must be specular."""
+
+    def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> SurfaceSamples:
+        """
+        Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.
+        """
+
+    def capture_cube(self, origin: Sequence[float], size: int, hidden: Sequence[int] = ..., options: TraceOptions = ...) -> NDArray[numpy.float32]:
+        """
+        Cube map (6, size, size, 3) of the radiance that arrives at `origin`, the rays passing through the objects
+        in `hidden`, whose shadows and reflections on other things remain.
+        """
+
+    def intersect(self, origins: NDArray[numpy.float32], directions: NDArray[numpy.float32], hidden: Sequence[int] = ...) -> tuple[NDArray[numpy.float32], NDArray[numpy.int32], NDArray[numpy.float32]]:
+        """
+        First hits of rays, arrays of shape (n, 3), through the objects in `hidden`. Returns the distance in metres
+        (n,), inf for a miss; the object (n,), -1 for a miss or a rectangle light; the geometric normal (n, 3).
+        """
+
+    def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...) -> NDArray[numpy.float32]:
+        """
+        Irradiance at every vertex of an object's front, (vertices, 3), all light included.
+        """
+
 class CubePyramidLayout:
     """
     Order of the texels of a cube map with all its mip levels: the finest level first, in a level the six faces (+X -X +Y -Y +Z -Z), in a face the rows from the top.
@@ -517,7 +798,7 @@ class RenderingMatrix:
     def row_samples(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
         """uint32 (rows,): how many samples of the pixel see the part."""
 
-    def average(self, samples: "mirrorbake::SurfaceSamples", part: int, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+    def average(self, samples: SurfaceSamples, part: int, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """
         Mean of per-sample values, float32 (len(samples), C), over each row's samples: float32 (rows, C).
         """
@@ -525,7 +806,7 @@ class RenderingMatrix:
     def multiply(self, x: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """b = A x for x float32 (columns, C): float32 (rows, C)."""
 
-def build_rendering_matrix(samples: "mirrorbake::SurfaceSamples", part: int, proxy: Proxy, layout: CubePyramidLayout, options: LookupOptions = ...) -> RenderingMatrix:
+def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, layout: CubePyramidLayout, options: LookupOptions = ...) -> RenderingMatrix:
     """
     Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups.
     """
@@ -617,14 +898,14 @@ class PartMaps:
         distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part without a local layer.
         """
 
-def render_reflector(samples: "mirrorbake::SurfaceSamples", parts: Sequence[PartMaps], layout: CubePyramidLayout, diffuse: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, options: LookupOptions = ...) -> NDArray[numpy.float32]:
+def render_reflector(samples: SurfaceSamples, parts: Sequence[PartMaps], layout: CubePyramidLayout, diffuse: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, options: LookupOptions = ...) -> NDArray[numpy.float32]:
     """
     Draws the reflector from its maps: (L_local + (1 - alpha) L_distant) F + D per sample, averaged over the pixel.
 
     diffuse: float32 (len(samples), 3) or None for black. Returns float32 (H, W, 4): light times coverage, and coverage.
     """
 
-def diffuse_from_irradiance(samples: "mirrorbake::SurfaceSamples", triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], vertex_irradiance: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], vertex_irradiance: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
     """
     Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex (V, 3).
     """

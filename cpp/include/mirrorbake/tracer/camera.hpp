@@ -12,6 +12,8 @@ struct Camera {
   float vertical_fov_degrees = 40.0F;  ///< in (0, 180)
   int width = 512;                     ///< pixels
   int height = 512;                    ///< pixels
+
+  bool operator==(const Camera&) const = default;
 };
 
 /// Throws InvalidArgument for sizes outside 1…16384, a field of view outside (0,180), eye = target, an `up` along

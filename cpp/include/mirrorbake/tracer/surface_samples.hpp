@@ -24,11 +24,14 @@ struct SurfaceSamples {
   std::vector<std::uint32_t> triangle;   ///< of the reflector's mesh
   std::vector<glm::vec2> barycentric;    ///< weights of the triangle's second and third vertex
   std::vector<glm::vec3> position;       ///< world space
-  std::vector<glm::vec3> normal;         ///< unit shading normal, towards the eye
+  /// Unit shading normal, towards the eye. Where the mesh's interpolated normal would reflect the view into the
+  /// surface it is bent until the reflection just leaves it.
+  std::vector<glm::vec3> normal;
   std::vector<glm::vec3> reflection;     ///< unit direction r = 2(n·v)n − v
 
   /// Change of `position` and `reflection` per pixel to the right (dx) and down (dy): ray differentials (Igehy,
-  /// SIGGRAPH 1999) on the tangent plane with the interpolated normal.
+  /// SIGGRAPH 1999), the point sliding in its triangle's plane, the normal interpolated. Bounded: near the silhouette
+  /// the cosine to the plane is taken as 0.1 at least, and a change of direction as 2 at most.
   std::vector<glm::vec3> dposition_dx, dposition_dy;
   std::vector<glm::vec3> dreflection_dx, dreflection_dy;
 
@@ -36,7 +39,7 @@ struct SurfaceSamples {
   std::vector<glm::vec3> albedo;         ///< diffuse albedo with texture, times (1 − F) under a coat
 
   // The light that was traced, one entry per sample, or empty when only visibility was asked for.
-  std::vector<glm::vec3> diffuse;        ///< D: reflected diffuse radiance
+  std::vector<glm::vec3> diffuse;        ///< D: radiance that the body reflects and emits
   std::vector<glm::vec4> local;          ///< incident radiance from the reflector itself, premultiplied, and α
   std::vector<glm::vec3> distant;        ///< incident radiance through the reflector
   std::vector<float> hit_distance;       ///< along `reflection` to what the distant ray hits; +inf: nothing

@@ -17,8 +17,9 @@
 namespace mirrorbake {
 
 /// Light that reaches a diffuse surface by way of other diffuse surfaces. `none` drops it. `cached` gathers it once
-/// per vertex of the static scene and interpolates: noise-free, blurred over a triangle's size. `path` follows
-/// random paths: unbiased, noisy.
+/// per vertex of the static scene and interpolates: noise-free, blurred over a triangle's size, without caustics (the
+/// glow of a lamp that a mirror throws on a wall). `path` follows random paths: unbiased, noisy. Direct light
+/// is sampled at every point in all three.
 enum class IndirectLight { none, cached, path };
 
 struct TracerOptions {
@@ -35,10 +36,14 @@ struct TraceOptions {
   std::uint64_t seed = 0;
 };
 
-/// The segmented layers of one reflector in one view ([PEM] §3, spec T4), averaged over each pixel: the channels
-/// are named `coverage`, `diffuse.R` …, `fresnel.R` …, `specular_local.R` … `specular_local.A`,
-/// `specular_distant.R` …, `distance`, `reflection.X` …, `normal.X` …, `position.X` …, `part`, and `R`, `G`, `B` for
-/// the beauty image, which has the surroundings too. `specular_*`, `fresnel`, `diffuse` and the geometry are means over the covered samples.
+/// The segmented layers of one reflector in one view ([PEM] §3, spec T4), averaged over each pixel: the channels are `R`,
+/// `G`, `B` for the beauty image, which has the surroundings too; `coverage`; `diffuse.R` …, `fresnel.R` …,
+/// `specular_local.R` … `specular_local.A`, `specular_distant.R` …, `distance`, `reflection.X` …, `normal.X` …,
+/// `position.X` …, means over the covered samples, 0 where there are none; and `part`, the most frequent one, −1 for
+/// none. `distance` averages the finite ones, and is +inf where all are infinite.
+///
+/// Per sample, diffuse + fresnel · (local.rgb + (1 − local.a) · distant) is the beauty value up to float
+/// rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel.
 struct LayerTrace {
   Image layers;
   SurfaceSamples samples;        ///< with the traced light
@@ -48,7 +53,7 @@ struct LayerTrace {
 /// First hit of a ray. A miss has `distance` = +inf.
 struct RayHit {
   float distance = std::numeric_limits<float>::infinity();
-  std::int32_t object = -1;
+  std::int32_t object = -1;  ///< −1: nothing, or a rectangle light
   glm::vec3 normal{0.0F};  ///< unit geometric normal
 };
 
@@ -66,23 +71,26 @@ class Tracer {
   /// Image of everything, channels R, G, B.
   Image trace_beauty(const Camera& camera, const TraceOptions& options) const;
 
-  /// Layers of the object number `reflector`, whose material must be specular.
+  /// Layers of the object number `reflector`, whose material must be specular. Throws InvalidArgument for an eye inside
+  /// it: in its bounding box, most directions meeting the back of its surface first.
   LayerTrace trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const;
 
   /// Only what is visible of `reflector`: the geometry part of SurfaceSamples, by the same camera rays as
   /// trace_layers with the same options.
   SurfaceSamples trace_visibility(const Camera& camera, int reflector, const TraceOptions& options) const;
 
-  /// Cube map of the radiance that arrives at `origin`, the objects in `hidden` removed: channels R, G, B, face after
+  /// Cube map of the radiance that arrives at `origin`, by rays that pass through the objects in `hidden`. What the rays
+  /// show still bears those objects' shadows and reflections, as in the distant layer. Channels R, G, B, face after
   /// face (+X −X +Y −Y +Z −Z) from top to bottom in one image of `size` × 6·`size`.
   Image capture_cube(glm::vec3 origin, int size, std::span<const int> hidden, const TraceOptions& options) const;
 
-  /// First hits of arbitrary rays, the objects in `hidden` removed. Throws InvalidArgument for a ray that is not finite or has no direction.
+  /// First hits of arbitrary rays that pass through the objects in `hidden`. Throws InvalidArgument for a ray that is not finite or has no direction.
   std::vector<RayHit> intersect(std::span<const glm::vec3> origins, std::span<const glm::vec3> directions,
                                 std::span<const int> hidden) const;
 
-  /// Irradiance (W m⁻²) at every vertex of an object, all light included, the object itself taking part: the
-  /// view-independent diffuse layer.
+  /// Irradiance (W m⁻²) on the front at every vertex of an object, all light included, the object itself taking part:
+  /// the view-independent diffuse layer. An average over the quarter of each adjacent triangle next to the
+  /// vertex, by `rays` (1…65536) samples; 0 at vertices without triangles.
   std::vector<glm::vec3> vertex_irradiance(int object, int rays, std::uint64_t seed) const;
 
  private:

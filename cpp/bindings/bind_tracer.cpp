@@ -1,0 +1,277 @@
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bind.hpp"
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/tracer/tracer.hpp"
+
+namespace mirrorbake::bindings {
+namespace {
+
+auto image_to_numpy(Image&& image) {
+  return to_numpy(std::move(image.pixels), {static_cast<std::size_t>(image.height),
+                                            static_cast<std::size_t>(image.width), image.channels.size()});
+}
+
+std::span<const glm::vec3> points(const PointArray& array) {
+  static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
+  return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
+}
+
+// Read-only views that keep the owner alive.
+template <auto member>
+void def_vectors(nb::class_<SurfaceSamples>& c, const char* name, const char* doc) {
+  c.def_prop_ro(
+      name, [](nb::handle self) { return vectors_view(nb::cast<const SurfaceSamples&>(self).*member, self); },
+      doc);
+}
+template <auto member>
+void def_scalars(nb::class_<SurfaceSamples>& c, const char* name, const char* doc) {
+  c.def_prop_ro(
+      name, [](nb::handle self) { return scalars_view(nb::cast<const SurfaceSamples&>(self).*member, self); },
+      doc);
+}
+
+void bind_samples(nb::module_& m) {
+  nb::class_<SurfaceSamples> c(m, "SurfaceSamples",
+                               "Where the samples of an image's pixels first meet the reflector: one entry "
+                               "per sample that sees it, ordered by\n"
+                               "pixel, then by sample. All arrays are read-only views; the last four are "
+                               "empty when no light was traced.");
+  c.def_ro("width", &SurfaceSamples::width, "Of the image, pixels.");
+  c.def_ro("height", &SurfaceSamples::height, "Of the image, pixels.");
+  c.def_ro("samples_per_pixel", &SurfaceSamples::samples_per_pixel);
+  c.def("__len__", &SurfaceSamples::size);
+  using S = SurfaceSamples;
+  def_scalars<&S::pixel>(c, "pixel", "(n,) uint32: y * width + x.");
+  def_scalars<&S::part>(c, "part", "(n,) uint16: part of the reflector.");
+  def_scalars<&S::triangle>(c, "triangle", "(n,) uint32: triangle of the reflector's mesh.");
+  def_vectors<&S::barycentric>(c, "barycentric",
+                               "(n, 2): weights of the triangle's second and third vertex.");
+  def_vectors<&S::position>(c, "position", "(n, 3): world space, metres.");
+  def_vectors<&S::normal>(c, "normal", "(n, 3): unit shading normal, towards the eye.");
+  def_vectors<&S::reflection>(c, "reflection", "(n, 3): unit direction r = 2(n·v)n - v.");
+  def_vectors<&S::dposition_dx>(c, "dposition_dx", "(n, 3): change of `position` per pixel to the right.");
+  def_vectors<&S::dposition_dy>(c, "dposition_dy", "(n, 3): change of `position` per pixel down.");
+  def_vectors<&S::dreflection_dx>(c, "dreflection_dx",
+                                  "(n, 3): change of `reflection` per pixel to the right.");
+  def_vectors<&S::dreflection_dy>(c, "dreflection_dy", "(n, 3): change of `reflection` per pixel down.");
+  def_vectors<&S::fresnel>(c, "fresnel", "(n, 3): Fresnel reflectance F of the first bounce.");
+  def_vectors<&S::albedo>(c, "albedo", "(n, 3): diffuse albedo, times (1 - F) under a coat.");
+  def_vectors<&S::diffuse>(c, "diffuse", "(n, 3): radiance D that the body reflects and emits.");
+  def_vectors<&S::local>(c, "local",
+                         "(n, 4): incident radiance from the reflector itself, premultiplied, and alpha.");
+  def_vectors<&S::distant>(c, "distant", "(n, 3): incident radiance through the reflector.");
+  def_scalars<&S::hit_distance>(
+      c, "hit_distance", "(n,): metres along `reflection` to what the distant ray hits; inf: nothing.");
+}
+
+}  // namespace
+
+void bind_tracer(nb::module_& m) {
+  nb::class_<Camera>(m, "Camera", "A pinhole camera. Pixel (0,0) is the top left one.")
+      .def(
+          "__init__",
+          [](Camera* self, glm::vec3 eye, glm::vec3 target, glm::vec3 up, float vertical_fov_degrees,
+             int width, int height) {
+            const Camera camera{eye, target, up, vertical_fov_degrees, width, height};
+            validate(camera);
+            new (self) Camera(camera);
+          },
+          nb::arg("eye"), nb::arg("target"), nb::arg("up") = glm::vec3(0.0F, 1.0F, 0.0F),
+          nb::arg("vertical_fov_degrees") = Camera{}.vertical_fov_degrees, nb::arg("width") = Camera{}.width,
+          nb::arg("height") = Camera{}.height)
+      .def_rw("eye", &Camera::eye)
+      .def_rw("target", &Camera::target)
+      .def_rw("up", &Camera::up)
+      .def_rw("vertical_fov_degrees", &Camera::vertical_fov_degrees, "In (0, 180).")
+      .def_rw("width", &Camera::width, "Pixels, 1 to 16384.")
+      .def_rw("height", &Camera::height, "Pixels, 1 to 16384.")
+      .def(
+          "__eq__", [](const Camera& a, const Camera& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"))
+      .def("__repr__", [](const Camera& c) {
+        const auto text = [](glm::vec3 v) {
+          return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
+        };
+        return "Camera(eye=" + text(c.eye) + ", target=" + text(c.target) + ", up=" + text(c.up) +
+               ", vertical_fov_degrees=" + std::to_string(c.vertical_fov_degrees) +
+               ", width=" + std::to_string(c.width) + ", height=" + std::to_string(c.height) + ")";
+      });
+
+  nb::enum_<IndirectLight>(
+      m, "IndirectLight",
+      "How light that reaches a diffuse surface by way of other diffuse surfaces is found.")
+      .value("none", IndirectLight::none, "Not at all.")
+      .value("cached", IndirectLight::cached,
+             "Gathered once per vertex: noise-free, blurred over a triangle.")
+      .value("path", IndirectLight::path, "Random paths: unbiased, noisy.");
+
+  nb::class_<TracerOptions>(m, "TracerOptions", "What is decided once per scene.")
+      .def(
+          "__init__",
+          [](TracerOptions* self, IndirectLight indirect, int cache_rays, int cache_bounces,
+             std::uint64_t seed) {
+            new (self) TracerOptions{indirect, cache_rays, cache_bounces, seed};
+          },
+          nb::kw_only(), nb::arg("indirect") = TracerOptions{}.indirect,
+          nb::arg("cache_rays") = TracerOptions{}.cache_rays,
+          nb::arg("cache_bounces") = TracerOptions{}.cache_bounces, nb::arg("seed") = TracerOptions{}.seed)
+      .def_rw("indirect", &TracerOptions::indirect)
+      .def_rw("cache_rays", &TracerOptions::cache_rays, "Gather rays per vertex and bounce, 1 to 65536.")
+      .def_rw("cache_bounces", &TracerOptions::cache_bounces, "Diffuse bounces of the cache, 1 to 16.")
+      .def_rw("seed", &TracerOptions::seed, "Of the cache.");
+
+  nb::class_<TraceOptions>(m, "TraceOptions", "What is decided per image.")
+      .def(
+          "__init__",
+          [](TraceOptions* self, int samples_per_pixel, int max_specular_depth, int max_diffuse_depth,
+             std::uint64_t seed) {
+            new (self) TraceOptions{samples_per_pixel, max_specular_depth, max_diffuse_depth, seed};
+          },
+          nb::kw_only(), nb::arg("samples_per_pixel") = TraceOptions{}.samples_per_pixel,
+          nb::arg("max_specular_depth") = TraceOptions{}.max_specular_depth,
+          nb::arg("max_diffuse_depth") = TraceOptions{}.max_diffuse_depth,
+          nb::arg("seed") = TraceOptions{}.seed)
+      .def_rw("samples_per_pixel", &TraceOptions::samples_per_pixel, "1 to 65536.")
+      .def_rw("max_specular_depth", &TraceOptions::max_specular_depth,
+              "Mirror bounces after the first, 0 to 64.")
+      .def_rw("max_diffuse_depth", &TraceOptions::max_diffuse_depth,
+              "Diffuse bounces of IndirectLight.path, 0 to 64.")
+      .def_rw("seed", &TraceOptions::seed);
+
+  bind_samples(m);
+
+  nb::class_<LayerTrace>(m, "LayerTrace", "The layers of one reflector in one view.")
+      .def_prop_ro(
+          "layers",
+          [](nb::handle self) {
+            const Image& image = nb::cast<const LayerTrace&>(self).layers;
+            const std::size_t shape[3] = {static_cast<std::size_t>(image.height),
+                                          static_cast<std::size_t>(image.width), image.channels.size()};
+            return nb::ndarray<nb::numpy, const float>(image.pixels.data(), 3, shape, self);
+          },
+          "(height, width, channels) float32, read-only: means over each pixel's samples.")
+      .def_prop_ro(
+          "channels", [](const LayerTrace& trace) { return trace.layers.channels; },
+          "Names of the channels of `layers`.")
+      .def_prop_ro(
+          "samples", [](const LayerTrace& trace) -> const SurfaceSamples& { return trace.samples; },
+          nb::rv_policy::reference_internal, "The samples that see the reflector, with the traced light.")
+      .def_prop_ro(
+          "sample_beauty",
+          [](nb::handle self) { return vectors_view(nb::cast<const LayerTrace&>(self).sample_beauty, self); },
+          "(n, 3): beauty value of each entry of `samples`, by the beauty integrator.");
+
+  nb::class_<Tracer>(
+      m, "Tracer",
+      "A scene made ready for tracing. Same arguments give the same bits on any number of threads.")
+      .def(
+          "__init__",
+          [](Tracer* self, const Scene& scene, const TracerOptions& options) {
+            nb::gil_scoped_release released;
+            new (self) Tracer(scene, options);
+          },
+          nb::arg("scene"), nb::arg("options") = TracerOptions{},
+          "Copies the scene, builds the acceleration structure and, with IndirectLight.cached, gathers the "
+          "cache.")
+      .def_prop_ro(
+          "scene", [](const Tracer& tracer) -> const Scene& { return tracer.scene(); },
+          nb::rv_policy::reference_internal)
+      .def(
+          "trace_beauty",
+          [](const Tracer& tracer, const Camera& camera, const TraceOptions& options) {
+            Image image;
+            {
+              nb::gil_scoped_release released;
+              image = tracer.trace_beauty(camera, options);
+            }
+            return image_to_numpy(std::move(image));
+          },
+          nb::arg("camera"), nb::arg("options") = TraceOptions{},
+          nb::sig("def trace_beauty(self, camera: Camera, options: TraceOptions = ...) -> "
+                  "NDArray[numpy.float32]"),
+          "Image of everything: (height, width, 3) float32 radiance.")
+      .def("trace_layers", &Tracer::trace_layers, nb::arg("camera"), nb::arg("reflector"),
+           nb::arg("options") = TraceOptions{}, nb::call_guard<nb::gil_scoped_release>(),
+           nb::sig("def trace_layers(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> "
+                   "LayerTrace"),
+           "Layers of object number `reflector`, whose material must be specular.")
+      .def("trace_visibility", &Tracer::trace_visibility, nb::arg("camera"), nb::arg("reflector"),
+           nb::arg("options") = TraceOptions{}, nb::call_guard<nb::gil_scoped_release>(),
+           nb::sig(
+               "def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> "
+               "SurfaceSamples"),
+           "Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.")
+      .def(
+          "capture_cube",
+          [](const Tracer& tracer, glm::vec3 origin, int size, const std::vector<int>& hidden,
+             const TraceOptions& options) {
+            Image image;
+            {
+              nb::gil_scoped_release released;
+              image = tracer.capture_cube(origin, size, hidden, options);
+            }
+            const auto side = static_cast<std::size_t>(size);
+            return to_numpy(std::move(image.pixels), {6, side, side, 3});
+          },
+          nb::arg("origin"), nb::arg("size"), nb::arg("hidden") = std::vector<int>{},
+          nb::arg("options") = TraceOptions{},
+          nb::sig("def capture_cube(self, origin: collections.abc.Sequence[float], size: int, "
+                  "hidden: collections.abc.Sequence[int] = ..., options: TraceOptions = ...) -> "
+                  "NDArray[numpy.float32]"),
+          "Cube map (6, size, size, 3) of the radiance that arrives at `origin`, the rays passing through "
+          "the objects\n"
+          "in `hidden`, whose shadows and reflections on other things remain.")
+      .def(
+          "intersect",
+          [](const Tracer& tracer, PointArray origins, PointArray directions,
+             const std::vector<int>& hidden) {
+            std::vector<RayHit> hits;
+            {
+              nb::gil_scoped_release released;
+              hits = tracer.intersect(points(origins), points(directions), hidden);
+            }
+            std::vector<float> distance;
+            std::vector<std::int32_t> object;
+            std::vector<glm::vec3> normal;
+            for (const RayHit& hit : hits) {
+              distance.push_back(hit.distance);
+              object.push_back(hit.object);
+              normal.push_back(hit.normal);
+            }
+            const std::size_t count = hits.size();
+            return nb::make_tuple(to_numpy(std::move(distance), {count}),
+                                  to_numpy(std::move(object), {count}), vectors_to_numpy(std::move(normal)));
+          },
+          nb::arg("origins"), nb::arg("directions"), nb::arg("hidden") = std::vector<int>{},
+          nb::sig("def intersect(self, origins: NDArray[numpy.float32], directions: NDArray[numpy.float32], "
+                  "hidden: collections.abc.Sequence[int] = ...) -> tuple[NDArray[numpy.float32], "
+                  "NDArray[numpy.int32], NDArray[numpy.float32]]"),
+          "First hits of rays, arrays of shape (n, 3), through the objects in `hidden`. Returns the distance "
+          "in metres\n"
+          "(n,), inf for a miss; the object (n,), -1 for a miss or a rectangle light; the geometric normal "
+          "(n, 3).")
+      .def(
+          "vertex_irradiance",
+          [](const Tracer& tracer, int object, int rays, std::uint64_t seed) {
+            std::vector<glm::vec3> irradiance;
+            {
+              nb::gil_scoped_release released;
+              irradiance = tracer.vertex_irradiance(object, rays, seed);
+            }
+            return vectors_to_numpy(std::move(irradiance));
+          },
+          nb::arg("object"), nb::arg("rays") = 256, nb::arg("seed") = 0,
+          nb::sig("def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...) -> "
+                  "NDArray[numpy.float32]"),
+          "Irradiance at every vertex of an object's front, (vertices, 3), all light included.");
+}
+
+}  // namespace mirrorbake::bindings

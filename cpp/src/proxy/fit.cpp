@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <string>
 #include <vector>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 #include "vec_text.hpp"
@@ -123,9 +123,7 @@ int side_of(const glm::dvec3& d) {
   return 2 * axis + (d[axis] > 0 ? 1 : 0);
 }
 
-double side_distance(const glm::dvec3& d, int side) {
-  return (side % 2 == 1 ? 1.0 : -1.0) * d[side / 2];
-}
+double side_distance(const glm::dvec3& d, int side) { return (side % 2 == 1 ? 1.0 : -1.0) * d[side / 2]; }
 
 /// Hits relative to the origin, without those at the origin itself.
 std::vector<glm::dvec3> hits_from(std::span<const glm::vec3> hits, glm::vec3 origin) {

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <type_traits>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <string>
-#include <type_traits>
 
 #include "mirrorbake/core/error.hpp"
 #include "vec_text.hpp"

@@ -2,14 +2,12 @@
 
 #include <cmath>
 #include <cstdio>
-#include <glm/vec3.hpp>
 #include <string>
+#include <glm/vec3.hpp>
 
 namespace mirrorbake::detail {
 
-inline bool is_finite(glm::vec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
+inline bool is_finite(glm::vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 /// "(1, 2, 3)", for error messages.
 inline std::string vec_text(glm::vec3 v) {

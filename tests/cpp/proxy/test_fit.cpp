@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <random>
 #include <vector>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/proxy/fit.hpp"

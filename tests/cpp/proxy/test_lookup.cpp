@@ -3,15 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <limits>
 #include <numbers>
 #include <random>
 #include <string>
 #include <vector>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/isa.hpp"
+#include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/proxy/proxy.hpp"
 
 namespace mirrorbake {
@@ -44,12 +46,9 @@ struct Gauge {
   long double operator()(const Long3& point) const {
     const Long3 q = axes * (point - centre) / extent;
     switch (kind) {
-      case box:
-        return std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z)});
-      case ellipsoid:
-        return std::sqrt(glm::dot(q, q));
-      default:
-        return std::max(std::sqrt(glm::dot(q, q)), 1 - q.y);
+      case box: return std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z)});
+      case ellipsoid: return std::sqrt(glm::dot(q, q));
+      default: return std::max(std::sqrt(glm::dot(q, q)), 1 - q.y);
     }
   }
 };
@@ -114,12 +113,8 @@ glm::vec3 point_at(const Gauge& gauge, long double value, std::mt19937& random) 
   Long3 unit = local;
   Long3 base(0);
   switch (gauge.kind) {
-    case Gauge::box:
-      unit /= std::max({std::abs(local.x), std::abs(local.y), std::abs(local.z)});
-      break;
-    case Gauge::ellipsoid:
-      unit /= glm::length(local);
-      break;
+    case Gauge::box: unit /= std::max({std::abs(local.x), std::abs(local.y), std::abs(local.z)}); break;
+    case Gauge::ellipsoid: unit /= glm::length(local); break;
     default:  // the gauge of the half ball is not homogeneous: shrink it about a point inside
       base = Long3(0, 0.3L, 0);
       unit /= glm::length(local);
@@ -277,20 +272,68 @@ TEST(Lookup, IsNeverNotANumber) {
   }
 }
 
-TEST(Lookup, BatchGivesTheSameBitsAsOneAtATime) {
-  std::mt19937 random(5);
+TEST(Lookup, BatchGivesTheSameBitsAsOneAtATimeOnEveryInstructionSet) {
+  for (const Isa isa : {Isa::baseline, Isa::sse42, Isa::avx2, Isa::avx512}) {
+    const IsaLimit limit(isa);
+    std::mt19937 random(5);
+    for (const Case& c : varied_shapes(random)) {
+      for (std::size_t count : {0U, 1U, 7U, 128U, 300U}) {
+        std::vector<glm::vec3> positions(count), directions(count), lookups(count);
+        for (std::size_t i = 0; i < count; ++i) {
+          positions[i] = point_at(c.gauge, i % 3 == 0 ? 1.3L : 0.8L, random);
+          directions[i] = random_direction(random);
+          if (i % 5 == 0) directions[i].y = 0;
+        }
+        lookup_directions(c.proxy, positions, directions, lookups);
+        for (std::size_t i = 0; i < count; ++i) {
+          ASSERT_EQ(lookups[i], lookup_direction(c.proxy, positions[i], directions[i]))
+              << to_string(isa) << ' ' << i;
+        }
+      }
+    }
+  }
+}
+
+TEST(Lookup, BatchGivesTheSameBitsInFloat64AndInPlaceAndOnTwoThreads) {
+  std::mt19937 random(6);
+  const Case c = varied_shapes(random)[20];
+  constexpr std::size_t kCount = 40000;
+  std::vector<glm::dvec3> positions(kCount), directions(kCount), lookups(kCount);
+  for (std::size_t i = 0; i < kCount; ++i) {
+    positions[i] = glm::dvec3(point_at(c.gauge, 0.8L, random));
+    directions[i] = glm::dvec3(random_direction(random));
+  }
+  {
+    const ThreadLimit two(2);
+    lookup_directions(c.proxy, positions, directions, lookups);
+  }
+  const ThreadLimit one(1);
+  std::vector<glm::dvec3> in_place = directions;
+  lookup_directions(c.proxy, positions, in_place, in_place);
+  for (std::size_t i = 0; i < kCount; ++i) {
+    ASSERT_EQ(lookups[i], lookup_direction(c.proxy, positions[i], directions[i]));
+    ASSERT_EQ(in_place[i], lookups[i]);
+  }
+}
+
+// r = 2(n·v)n − v for unit n (spec §0), here in long double; normals of any length have to give the same.
+TEST(Lookup, MirrorsFollowTheReflectionOfTheEyesRay) {
+  std::mt19937 random(7);
+  const glm::vec3 eye(3, 4, -5);
   for (const Case& c : varied_shapes(random)) {
-    for (std::size_t count : {0U, 1U, 7U, 64U, 300U}) {
-      std::vector<glm::vec3> positions(count), directions(count), lookups(count);
-      for (std::size_t i = 0; i < count; ++i) {
-        positions[i] = point_at(c.gauge, i % 3 == 0 ? 1.3L : 0.8L, random);
-        directions[i] = random_direction(random);
-        if (i % 5 == 0) directions[i].y = 0;
-      }
-      lookup_directions(c.proxy, positions, directions, lookups);
-      for (std::size_t i = 0; i < count; ++i) {
-        ASSERT_EQ(lookups[i], lookup_direction(c.proxy, positions[i], directions[i])) << i;
-      }
+    std::vector<glm::vec3> positions(50), normals(50), lookups(50);
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      positions[i] = point_at(c.gauge, 0.8L, random);
+      normals[i] = random_direction(random);
+    }
+    mirror_lookups(c.proxy, eye, positions, normals, lookups);
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const Long3 n = glm::normalize(Long3(normals[i]));
+      const Long3 v = glm::normalize(Long3(eye) - Long3(positions[i]));
+      const Long3 r = 2 * glm::dot(n, v) * n - v;
+      const Long3 expected = exit_point(c.gauge, positions[i], r) - Long3(c.proxy.origin);
+      // The reflection in double costs 1e-16, times the aspect ratio of flat shapes; then rounding to float.
+      EXPECT_LT(angle(Long3(lookups[i]), expected), 2e-7L);
     }
   }
 }
@@ -299,6 +342,11 @@ TEST(Lookup, BatchRejectsSpansOfDifferentLength) {
   std::vector<glm::vec3> two(2), three(3);
   EXPECT_THROW(lookup_directions(Proxy{Box{}, {}}, two, three, three), InvalidArgument);
   EXPECT_THROW(lookup_directions(Proxy{Box{}, {}}, three, three, two), InvalidArgument);
+}
+
+TEST(Lookup, MirrorsRejectSpansOfDifferentLength) {
+  std::vector<glm::vec3> two(2), three(3);
+  EXPECT_THROW(mirror_lookups(Proxy{Box{}, {}}, {0, 0, 0}, two, three, three), InvalidArgument);
 }
 
 TEST(ProxyValidation, NamesTheFieldThatIsUnusable) {

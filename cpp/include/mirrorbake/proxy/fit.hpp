@@ -1,7 +1,7 @@
 #pragma once
 
-#include <glm/vec3.hpp>
 #include <span>
+#include <glm/vec3.hpp>
 
 #include "mirrorbake/proxy/proxy.hpp"
 

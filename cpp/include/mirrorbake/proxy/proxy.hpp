@@ -1,9 +1,9 @@
 #pragma once
 
-#include <glm/mat3x3.hpp>
-#include <glm/vec3.hpp>
 #include <span>
 #include <variant>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
 
 /// Proxy geometry: the shape on which an environment map lies (spec §4, [PEM] §4 "EM Representations").
 ///
@@ -69,7 +69,7 @@ glm::vec3 lookup_direction(const Proxy& proxy, glm::vec3 position, glm::vec3 dir
 /// The same with float64 coordinates.
 glm::dvec3 lookup_direction(const Proxy& proxy, glm::dvec3 position, glm::dvec3 direction);
 
-/// The same for many rays, with the same bits as one at a time; several times faster. The three spans have
+/// The same for many rays, in parallel and vectorised, with the same bits as one at a time. The three spans have
 /// one length (else InvalidArgument); `lookups` may be the same memory as `positions` or `directions`, but
 /// not overlap partly.
 void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
@@ -78,6 +78,12 @@ void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
 /// The same with float64 coordinates.
 void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions,
                        std::span<const glm::dvec3> directions, std::span<glm::dvec3> lookups);
+
+/// Texture coordinates of a mirror's vertices or pixels ([PEM] §4): lookups along the reflections, about the `normals`
+/// (any length > 0), of rays from `eye` to the `positions`. The spans have one length (else InvalidArgument);
+/// `lookups` may be the memory of an input.
+void mirror_lookups(const Proxy& proxy, glm::vec3 eye, std::span<const glm::vec3> positions,
+                    std::span<const glm::vec3> normals, std::span<glm::vec3> lookups);
 
 /// Throws InvalidArgument, naming the field, if the proxy is not usable: extents not positive or not finite,
 /// axes not orthonormal (to 1e-4), origin not inside of the shape.

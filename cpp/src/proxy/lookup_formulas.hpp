@@ -1,0 +1,97 @@
+#pragma once
+
+/// Where rays leave the shapes: one formula each, without branches, that holds inside and outside (proxy.hpp
+/// documents what it means outside). Written once, in double, and compiled once per instruction set: everything lives
+/// in the namespace MIRRORBAKE_ISA and has internal linkage, and no other header is used.
+#ifndef MIRRORBAKE_ISA
+#define MIRRORBAKE_ISA baseline
+#endif
+
+#include "lookup_kernels.hpp"
+
+namespace mirrorbake::MIRRORBAKE_ISA {
+namespace {
+
+constexpr double kInfinity = __builtin_inf();
+
+struct Vec {
+  double x, y, z;
+};
+inline Vec operator+(const Vec& a, const Vec& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Vec operator*(double s, const Vec& v) { return {s * v.x, s * v.y, s * v.z}; }
+inline double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vec vec(const double* v) { return {v[0], v[1], v[2]}; }
+
+/// Ray parameter at which p + t·d crosses the wall at ±extent that d faces, ∞ if d is parallel to it.
+inline double wall_distance(double p, double d, double extent) {
+  const double t = __builtin_fabs(__builtin_copysign(extent, d) - p) / __builtin_fabs(d);
+  // 0/0, a point on the wall and a direction within it, must not win: the comparison is false for NaN.
+  return t >= 0 ? t : kInfinity;
+}
+
+/// Box [−extent, extent]. Three divisions are faster than one and the comparison of fractions, vectorised or not.
+inline double box_exit(const Vec& p, const Vec& d, const Vec& extent) {
+  const double x = wall_distance(p.x, d.x, extent.x);
+  const double y = wall_distance(p.y, d.y, extent.y);
+  const double z = wall_distance(p.z, d.z, extent.z);
+  const double xy = x < y ? x : y;
+  const double t = xy < z ? xy : z;
+  return t < kInfinity ? t : 0;
+}
+
+/// Unit sphere. |p + t·d|² = 1 has the larger root t = (−b + s)/a = −c/(b + s), s = √(b² − ac), of which the form is
+/// taken that does not cancel. A negative discriminant is a miss: with s = 0 the root is the nearest point; a negative
+/// root is behind: 0.
+inline double sphere_exit(const Vec& p, const Vec& d) {
+  const double a = dot(d, d);
+  const double b = dot(p, d);
+  const double c = dot(p, p) - 1.0;
+  const double discriminant = b * b - a * c;
+  const double s = __builtin_sqrt(discriminant > 0 ? discriminant : 0);
+  const bool away = b > 0;
+  const double t = (away ? -c : s - b) / (away ? b + s : a);
+  return t > 0 ? t : 0;  // also for 0/0, a zero direction
+}
+
+/// Half y ≥ 0 of the unit sphere.
+inline double hemisphere_exit(const Vec& p, const Vec& d) {
+  const double sphere = sphere_exit(p, d);
+  const double floor = __builtin_fabs(p.y / d.y);
+  return d.y < 0 && floor < sphere ? floor : sphere;
+}
+
+/// Rotates and scales into the shape's own coordinates. The aligned version leaves out products with zeros, which
+/// changes no bit of the result but the sign of a zero, to which the formulas are indifferent.
+template <bool rotated>
+inline Vec local_direction(const LookupConstants& k, const Vec& d) {
+  if constexpr (rotated) {
+    return {dot(vec(k.rows), d), dot(vec(k.rows + 3), d), dot(vec(k.rows + 6), d)};
+  } else {
+    return {k.rows[0] * d.x, k.rows[4] * d.y, k.rows[8] * d.z};
+  }
+}
+
+template <LookupShape shape, bool rotated>
+inline Vec lookup(const LookupConstants& k, const Vec& p, const Vec& d) {
+  if constexpr (shape == LookupShape::infinite) {
+    return d;
+  } else {
+    const Vec local_p = local_direction<rotated>(k, p - vec(k.centre));
+    const Vec local_d = local_direction<rotated>(k, d);
+    double t = 0;
+    if constexpr (shape == LookupShape::box) t = box_exit(local_p, local_d, vec(k.extent));
+    if constexpr (shape == LookupShape::ellipsoid) t = sphere_exit(local_p, local_d);
+    if constexpr (shape == LookupShape::hemisphere) t = hemisphere_exit(local_p, local_d);
+    return p + t * d - vec(k.origin);
+  }
+}
+
+/// Mirror direction, times |n|², of a ray from `eye` to p, normal n of any length.
+inline Vec reflect(const Vec& p, const Vec& n, const Vec& eye) {
+  const Vec v = eye - p;
+  return 2.0 * dot(n, v) * n - dot(n, n) * v;
+}
+
+}  // namespace
+}  // namespace mirrorbake::MIRRORBAKE_ISA

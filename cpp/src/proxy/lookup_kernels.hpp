@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+
+/// The inner loops over rays, one set per instruction set. Pointers, since the files that are compiled for AVX may not
+/// use inline functions of the standard library or GLM (see mirrorbake_add_isa_sources).
+namespace mirrorbake {
+
+enum class LookupShape { infinite, box, ellipsoid, hemisphere };
+
+/// A proxy as the loops want it: local = rows · (p − centre), where the rows of the 3×3 matrix are the proxy's axes,
+/// divided by the radii for curved shapes.
+struct LookupConstants {
+  LookupShape shape = LookupShape::infinite;
+  bool rotated = false;
+  double centre[3] = {};
+  double rows[9] = {};
+  double extent[3] = {};  ///< of a box
+  double origin[3] = {};
+};
+
+/// Arrays of xyz triples; `lookups` may be the same memory as an input.
+struct LookupKernels {
+  void (*rays_f32)(const LookupConstants& k, const float* positions, const float* directions, float* lookups,
+                   std::size_t count);
+  void (*rays_f64)(const LookupConstants& k, const double* positions, const double* directions,
+                   double* lookups, std::size_t count);
+  void (*mirrors_f32)(const LookupConstants& k, const double* eye, const float* positions,
+                      const float* normals, float* lookups, std::size_t count);
+};
+
+/// The loops for active_isa().
+const LookupKernels& lookup_kernels();
+
+namespace baseline {
+extern const LookupKernels kLookupKernels;
+}
+namespace sse42 {
+extern const LookupKernels kLookupKernels;
+}
+namespace avx2 {
+extern const LookupKernels kLookupKernels;
+}
+namespace avx512 {
+extern const LookupKernels kLookupKernels;
+}
+
+}  // namespace mirrorbake

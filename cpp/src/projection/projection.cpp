@@ -99,6 +99,37 @@ MapPoint point_from_direction(const Projection& p, glm::dvec3 d) {
   return {};
 }
 
+std::optional<glm::dvec2> point_on_face(const Projection& p, int face, glm::dvec3 d) {
+  switch (p.kind) {
+    case ProjectionKind::cube: {
+      const glm::dvec3 major = direction_from_cube_point(face, 0.0, 0.0);
+      const double depth = glm::dot(d, major);
+      if (!(depth > 1e-9 * glm::length(d))) return std::nullopt;
+      const glm::dvec3 x_axis = direction_from_cube_point(face, 1.0, 0.0) - major;
+      const glm::dvec3 y_axis = direction_from_cube_point(face, 0.0, 1.0) - major;
+      return glm::dvec2(glm::dot(d, x_axis), glm::dot(d, y_axis)) / depth;
+    }
+    case ProjectionKind::dual_paraboloid: {
+      const double length = glm::length(d);
+      const double q = length + (face == 0 ? d.z : -d.z);
+      if (!(q > 1e-9 * length)) return std::nullopt;
+      return glm::dvec2(d) / q;
+    }
+    case ProjectionKind::angular:
+    case ProjectionKind::fisheye: {
+      const double across = std::hypot(d.x, d.y);
+      const double radius = std::atan2(across, -d.z) / (0.5 * field_of_view_radians(p));
+      return across == 0.0 ? glm::dvec2(radius, 0.0) : radius / across * glm::dvec2(d);
+    }
+    case ProjectionKind::sphere_map:
+    case ProjectionKind::latlong: {
+      const MapPoint point = point_from_direction(p, d);
+      return glm::dvec2(point.x, point.y);
+    }
+  }
+  return std::nullopt;
+}
+
 glm::dvec3 direction_from_point(const Projection& p, int face, double x, double y) {
   switch (p.kind) {
     case ProjectionKind::cube: return glm::normalize(direction_from_cube_point(face, x, y));

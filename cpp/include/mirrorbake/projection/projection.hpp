@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -38,6 +39,10 @@ int face_count(const Projection& projection);
 int natural_aspect(const Projection& projection);
 
 MapPoint point_from_direction(const Projection& projection, glm::dvec3 direction);
+
+/// Position of a usable direction in the plane of a given face, which may lie outside of the face, so that what
+/// straddles an edge can be followed beyond it. Cube: behind the face there is none. Fisheye: not clamped to the rim.
+std::optional<glm::dvec2> point_on_face(const Projection& projection, int face, glm::dvec3 direction);
 
 /// Unit direction. (x, y) may lie outside of the face, see the single projections. `face` must exist.
 glm::dvec3 direction_from_point(const Projection& projection, int face, double x, double y);

@@ -1,0 +1,90 @@
+#include "mirrorbake/envmap/envmap.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+
+namespace mirrorbake {
+namespace {
+
+void check_names(const EnvMapLayout& layout, std::span<const std::string> names) {
+  if (!names.empty() && names.size() != static_cast<std::size_t>(layout.channels)) {
+    throw InvalidArgument("channels", std::to_string(names.size()) + " names",
+                          std::to_string(layout.channels));
+  }
+}
+
+}  // namespace
+
+std::size_t EnvMapLayout::level_offset(int level) const {
+  std::size_t texels = 0;
+  for (int l = 0; l < level; ++l) texels += level_texels(l);
+  return texels * static_cast<std::size_t>(channels);
+}
+
+int full_level_count(int width, int height) {
+  return static_cast<int>(std::bit_width(static_cast<unsigned>(std::max({width, height, 1}))));
+}
+
+void validate(const EnvMapLayout& layout) {
+  validate(layout.projection);
+  for (const auto& [name, side] : {std::pair{"width", layout.width}, {"height", layout.height}}) {
+    if (side < 1 || side > 65536) throw InvalidArgument(name, std::to_string(side), "1 to 65536 texels");
+  }
+  if (layout.projection.kind == ProjectionKind::cube && layout.width != layout.height) {
+    throw InvalidArgument(
+        "height", std::to_string(layout.height),
+        "the width, " + std::to_string(layout.width) + ": the faces of a cube map are square");
+  }
+  if (layout.channels < 1 || layout.channels > 1024) {
+    throw InvalidArgument("channels", std::to_string(layout.channels), "1 to 1024");
+  }
+  const int most = full_level_count(layout.width, layout.height);
+  if (layout.levels < 1 || layout.levels > most) {
+    throw InvalidArgument("levels", std::to_string(layout.levels), "1 to " + std::to_string(most));
+  }
+}
+
+void validate(const EnvMapView& map) {
+  validate(map.layout);
+  if (map.values.size() != map.layout.size()) {
+    throw InvalidArgument("values", std::to_string(map.values.size()) + " numbers",
+                          std::to_string(map.layout.size()) + " (levels, faces, rows, columns and channels)");
+  }
+  check_names(map.layout, map.channels);
+}
+
+EnvMap make_envmap(const EnvMapLayout& layout, std::span<const std::string> channels) {
+  validate(layout);
+  check_names(layout, channels);
+  return {layout, std::vector<float>(layout.size()), {channels.begin(), channels.end()}};
+}
+
+std::vector<double> integrate(const EnvMapView& map, int level) {
+  validate(map);
+  if (level < 0 || level >= map.layout.levels) {
+    throw InvalidArgument("level", std::to_string(level), "0 to " + std::to_string(map.layout.levels - 1));
+  }
+  const std::vector<double> angles = texel_solid_angles(map.layout.projection, map.layout.level_width(level),
+                                                        map.layout.level_height(level));
+  const std::span<const float> values = map.level(level);
+  const std::size_t channels = static_cast<std::size_t>(map.layout.channels);
+  std::vector<double> sums(channels);
+  for (std::size_t i = 0; i * channels < values.size(); ++i) {
+    const double angle = angles[i % angles.size()];
+    for (std::size_t c = 0; c < channels; ++c)
+      sums[c] += angle * static_cast<double>(values[i * channels + c]);
+  }
+  return sums;
+}
+
+std::size_t count_not_finite(const EnvMapView& map) {
+  return static_cast<std::size_t>(
+      std::count_if(map.values.begin(), map.values.end(), [](float v) { return !std::isfinite(v); }));
+}
+
+}  // namespace mirrorbake

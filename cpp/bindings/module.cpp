@@ -7,12 +7,9 @@ void bind_core(nb::module_& m);
 void bind_proxy(nb::module_& m);
 void bind_envmap(nb::module_& m);
 void bind_image(nb::module_& m);
-<<<<<<< Updated upstream
 void bind_scene(nb::module_& m);
 void bind_tracer(nb::module_& m);
-=======
 void bind_projection(nb::module_& m);
->>>>>>> Stashed changes
 void bind_inference(nb::module_& m);
 void bind_pem(nb::module_& m);
 
@@ -24,13 +21,10 @@ NB_MODULE(_core, m) {
   bind_core(m);
   bind_proxy(m);
   bind_image(m);
-<<<<<<< Updated upstream
   bind_scene(m);
   bind_tracer(m);
-=======
   bind_projection(m);
   bind_envmap(m);
->>>>>>> Stashed changes
   bind_inference(m);
   bind_pem(m);
 }

@@ -1,0 +1,478 @@
+#include "mirrorbake/proxy/choose.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/proxy/fit.hpp"
+#include "vec_text.hpp"
+
+namespace mirrorbake {
+namespace {
+
+using Parameters = Eigen::VectorXd;
+
+enum class Shape { infinite, sphere, hemisphere, box, ellipsoid };
+
+/// A family of shapes. Its parameters are, with lengths in units of the scene's scale and seen from the origin:
+///
+///   sphere      centre x y z, log radius
+///   hemisphere  centre x z, log depth of the floor, log radius
+///   box         log distances of the sides −x −y −z +x +y +z
+///   ellipsoid   centre x y z, log radii
+///   rotated     ... and a rotation vector
+struct Family {
+  const char* name;
+  Shape shape;
+  int parameters;
+  bool rotated;
+};
+
+// In rising order of parameters; of two with as many, the one with the cheaper lookup first.
+constexpr Family kFamilies[] = {
+    {"infinite", Shape::infinite, 0, false},          {"sphere", Shape::sphere, 4, false},
+    {"hemisphere", Shape::hemisphere, 4, false},      {"box", Shape::box, 6, false},
+    {"ellipsoid", Shape::ellipsoid, 6, false},        {"rotated box", Shape::box, 9, true},
+    {"rotated ellipsoid", Shape::ellipsoid, 9, true},
+};
+
+constexpr double kMaxLog = 12;  // of extents in units of the scale: e¹² = 160,000
+
+/// The rays of a fit, and the unit vectors from the origin towards what they meet.
+struct Problem {
+  std::vector<glm::dvec3> positions, directions, targets;
+  glm::vec3 origin{0.0F};
+  double scale = 1;
+
+  void add(const Problem& other, std::size_t i) {
+    positions.push_back(other.positions[i]);
+    directions.push_back(other.directions[i]);
+    targets.push_back(other.targets[i]);
+  }
+};
+
+/// Rodrigues' formula.
+glm::dmat3 rotation_from_vector(const glm::dvec3& v) {
+  const double angle = glm::length(v);
+  if (!(angle > 0)) return glm::dmat3(1.0);
+  const glm::dvec3 k = v / angle;
+  const glm::dmat3 cross(0, k.z, -k.y, -k.z, 0, k.x, k.y, -k.x, 0);
+  return glm::dmat3(1.0) + std::sin(angle) * cross + (1.0 - std::cos(angle)) * cross * cross;
+}
+
+bool feasible(const Family& family, const Parameters& q) {
+  if (!q.allFinite()) return false;
+  const auto extent_ok = [&](Eigen::Index first, Eigen::Index count) {
+    return q.segment(first, count).cwiseAbs().maxCoeff() <= kMaxLog;
+  };
+  // The origin has to lie clearly inside.
+  constexpr double kMaxGauge = 0.99;
+  switch (family.shape) {
+    case Shape::infinite: return true;
+    case Shape::sphere: return extent_ok(3, 1) && q.head(3).norm() < kMaxGauge * std::exp(q[3]);
+    case Shape::hemisphere:
+      return extent_ok(2, 2) && std::hypot(q[0], q[1], std::exp(q[2])) < kMaxGauge * std::exp(q[3]);
+    case Shape::box: return extent_ok(0, 6);
+    case Shape::ellipsoid:
+      return extent_ok(3, 3) &&
+             (q.head(3).array() / q.segment(3, 3).array().exp()).matrix().norm() < kMaxGauge;
+  }
+  return false;
+}
+
+Proxy make_proxy(const Family& family, const Parameters& q, const glm::vec3& origin, double scale) {
+  const glm::dvec3 o(origin);
+  glm::dmat3 axes(1.0);
+  if (family.rotated) axes = rotation_from_vector({q[6], q[7], q[8]});
+  const glm::mat3 proxy_from_world(axes);
+  const auto world = [&](const glm::dvec3& local) {
+    return glm::vec3(o + glm::transpose(axes) * (scale * local));
+  };
+  switch (family.shape) {
+    case Shape::infinite: break;
+    case Shape::sphere:
+      return {Ellipsoid{world({q[0], q[1], q[2]}), glm::vec3(static_cast<float>(scale * std::exp(q[3])))},
+              origin};
+    case Shape::hemisphere:
+      return {Hemisphere{world({q[0], -std::exp(q[2]), q[1]}), static_cast<float>(scale * std::exp(q[3]))},
+              origin};
+    case Shape::box: {
+      const glm::dvec3 low(std::exp(q[0]), std::exp(q[1]), std::exp(q[2]));
+      const glm::dvec3 high(std::exp(q[3]), std::exp(q[4]), std::exp(q[5]));
+      return {Box{world(0.5 * (high - low)), glm::vec3(0.5 * scale * (high + low)), proxy_from_world},
+              origin};
+    }
+    case Shape::ellipsoid: {
+      const glm::dvec3 radii(std::exp(q[3]), std::exp(q[4]), std::exp(q[5]));
+      return {Ellipsoid{world({q[0], q[1], q[2]}), glm::vec3(scale * radii), proxy_from_world}, origin};
+    }
+  }
+  return {InfiniteSphere{}, origin};
+}
+
+/// Unit lookup directions of all rays.
+std::vector<glm::dvec3> unit_lookups(const Problem& problem, const Proxy& proxy) {
+  std::vector<glm::dvec3> lookups(problem.positions.size());
+  lookup_directions(proxy, problem.positions, problem.directions, lookups);
+  for (glm::dvec3& lookup : lookups) lookup = glm::normalize(lookup);
+  return lookups;
+}
+
+double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
+  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+}
+
+double mean_angle(const Problem& problem, const Proxy& proxy) {
+  const std::vector<glm::dvec3> lookups = unit_lookups(problem, proxy);
+  double sum = 0;
+  for (std::size_t i = 0; i < lookups.size(); ++i) sum += angle_between(lookups[i], problem.targets[i]);
+  return sum / static_cast<double>(lookups.size());
+}
+
+struct Fit {
+  Parameters parameters;
+  double cost = std::numeric_limits<double>::infinity();
+};
+
+/// Below this chord the loss is quadratic, above linear (Huber): well below what one sees, well above rounding.
+constexpr double kHuberChord = 1e-3;
+
+/// Minimises Σ huber(|lookup − target|), chords between unit vectors.
+Fit fit_shape(const Family& family, const Problem& problem, const Parameters& start, int max_steps) {
+  Fit fit;
+  fit.parameters = start;
+  if (!feasible(family, start)) return fit;
+  const auto lookups_of = [&](const Parameters& q) {
+    return unit_lookups(problem, make_proxy(family, q, problem.origin, problem.scale));
+  };
+  const auto cost_of = [&](const std::vector<glm::dvec3>& lookups) {
+    double cost = 0;
+    for (std::size_t i = 0; i < lookups.size(); ++i) {
+      const double r = glm::length(lookups[i] - problem.targets[i]);
+      cost += r <= kHuberChord ? 0.5 * r * r / kHuberChord : r - 0.5 * kHuberChord;
+    }
+    return cost / static_cast<double>(lookups.size());
+  };
+  const Eigen::Index n = start.size();
+  std::vector<glm::dvec3> lookups = lookups_of(start);
+  fit.cost = cost_of(lookups);
+  if (n == 0) return fit;
+  double damping = 1e-2;
+  for (int step = 0; step < max_steps; ++step) {
+    // Finite differences of the parameters, all of which are of order 1; the proxy keeps them as floats.
+    constexpr double kDifference = 1e-3;
+    std::vector<std::vector<glm::dvec3>> columns(static_cast<std::size_t>(n));
+    for (Eigen::Index j = 0; j < n; ++j) {
+      Parameters moved = fit.parameters;
+      moved[j] += kDifference;
+      columns[static_cast<std::size_t>(j)] = lookups_of(moved);
+    }
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(n);
+    Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian(3, n);
+    for (std::size_t i = 0; i < lookups.size(); ++i) {
+      const glm::dvec3 r = lookups[i] - problem.targets[i];
+      const double weight = 1.0 / std::max(glm::length(r), kHuberChord);
+      for (Eigen::Index j = 0; j < n; ++j) {
+        const glm::dvec3 slope = (columns[static_cast<std::size_t>(j)][i] - lookups[i]) / kDifference;
+        jacobian.col(j) << slope.x, slope.y, slope.z;
+      }
+      normal.noalias() += weight * jacobian.transpose() * jacobian;
+      gradient.noalias() += weight * jacobian.transpose() * Eigen::Vector3d(r.x, r.y, r.z);
+    }
+    bool moved = false;
+    double gain = 0;
+    for (int attempt = 0; attempt < 8 && !moved; ++attempt) {
+      Eigen::MatrixXd damped = normal;
+      // The floor keeps parameters in place which no ray feels, such as the side of a box nobody sees.
+      const double floor = 1e-6 * normal.trace() + std::numeric_limits<double>::min();
+      damped.diagonal().array() += damping * normal.diagonal().array().max(floor);
+      Eigen::VectorXd change = damped.ldlt().solve(-gradient);
+      if (change.allFinite()) {
+        change = change.cwiseMax(-0.5).cwiseMin(0.5);
+        const Parameters next = fit.parameters + change;
+        if (feasible(family, next)) {
+          std::vector<glm::dvec3> next_lookups = lookups_of(next);
+          const double cost = cost_of(next_lookups);
+          if (cost < fit.cost) {
+            gain = (fit.cost - cost) / fit.cost;
+            fit.parameters = next;
+            fit.cost = cost;
+            lookups = std::move(next_lookups);
+            moved = true;
+          }
+        }
+      }
+      damping = moved ? std::max(0.2 * damping, 1e-9) : 5.0 * damping;
+    }
+    if (!moved || gain < 1e-6) break;
+  }
+  return fit;
+}
+
+Parameters box_parameters(const Box& box, const Problem& problem) {
+  Parameters q(6);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double offset = static_cast<double>(box.centre[axis]) - static_cast<double>(problem.origin[axis]);
+    const double half = static_cast<double>(box.half_extent[axis]);
+    q[axis] = std::log(std::max(half - offset, 1e-4 * half) / problem.scale);
+    q[axis + 3] = std::log(std::max(half + offset, 1e-4 * half) / problem.scale);
+  }
+  return q;
+}
+
+Parameters ellipsoid_parameters(const Parameters& box, double inflation) {
+  Parameters q(6);
+  for (int axis = 0; axis < 3; ++axis) {
+    q[axis] = 0.5 * (std::exp(box[axis + 3]) - std::exp(box[axis]));
+    q[axis + 3] = std::log(0.5 * inflation * (std::exp(box[axis + 3]) + std::exp(box[axis])));
+  }
+  return q;
+}
+
+Parameters with_rotation(const Parameters& q, const glm::dvec3& rotation) {
+  Parameters rotated(9);
+  rotated << q.head(6), rotation.x, rotation.y, rotation.z;
+  return rotated;
+}
+
+/// Hits in a frame rotated about the origin.
+std::vector<glm::vec3> rotated_hits(std::span<const glm::vec3> hits, glm::vec3 origin,
+                                    const glm::dvec3& rotation) {
+  const glm::dmat3 axes = rotation_from_vector(rotation);
+  std::vector<glm::vec3> rotated;
+  rotated.reserve(hits.size());
+  for (const glm::vec3& hit : hits) {
+    rotated.emplace_back(glm::dvec3(origin) + axes * (glm::dvec3(hit) - glm::dvec3(origin)));
+  }
+  return rotated;
+}
+
+std::vector<Parameters> starts(const Family& family, const Problem& problem,
+                               std::span<const glm::vec3> hits) {
+  if (family.shape == Shape::infinite) return {Parameters(0)};
+  const Parameters box = box_parameters(fit_box_robust(hits, problem.origin), problem);
+  switch (family.shape) {
+    case Shape::infinite: return {Parameters(0)};
+    case Shape::sphere: {
+      Parameters centred(4);
+      centred << 0, 0, 0, 0;
+      Parameters in_box(4);
+      const Parameters e = ellipsoid_parameters(box, 1.1);
+      in_box << e.head(3), e.tail(3).maxCoeff();
+      return {centred, in_box};
+    }
+    case Shape::hemisphere: {
+      Parameters q(4);
+      q << 0, 0, box[1], std::max(0.0, box[1] + 0.1);
+      Parameters wide = q;
+      wide[3] += 1;
+      return {q, wide};
+    }
+    default: break;
+  }
+  std::vector<Parameters> result;
+  const auto add = [&](const Parameters& sides, const glm::dvec3& rotation) {
+    const std::vector<Parameters> shapes =
+        family.shape == Shape::box
+            ? std::vector<Parameters>{sides}
+            : std::vector<Parameters>{ellipsoid_parameters(sides, 1.0), ellipsoid_parameters(sides, 1.2)};
+    for (const Parameters& q : shapes) result.push_back(family.rotated ? with_rotation(q, rotation) : q);
+  };
+  if (!family.rotated) {
+    add(box, {});
+    if (family.shape == Shape::ellipsoid) {
+      Parameters sphere(6);
+      sphere.setZero();
+      result.push_back(sphere);
+    }
+    return result;
+  }
+  // Rooms stand on their floor: turns about the vertical first, then two tilts.
+  constexpr double kDegree = 0.017453292519943295;
+  for (double turn : {0.0, 22.5, 45.0, 67.5}) {
+    const glm::dvec3 rotation(0, turn * kDegree, 0);
+    const Box turned = fit_box_robust(rotated_hits(hits, problem.origin, rotation), problem.origin);
+    add(box_parameters(turned, problem), rotation);
+  }
+  for (const glm::dvec3 rotation : {glm::dvec3(30 * kDegree, 0, 0), glm::dvec3(0, 0, 30 * kDegree)}) {
+    const Box tilted = fit_box_robust(rotated_hits(hits, problem.origin, rotation), problem.origin);
+    add(box_parameters(tilted, problem), rotation);
+  }
+  return result;
+}
+
+void check(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOptions& options) {
+  const std::size_t n = rays.positions.size();
+  if (rays.directions.size() != n || rays.distances.size() != n || rays.views.size() != n) {
+    throw InvalidArgument("rays",
+                          std::to_string(n) + " positions, " + std::to_string(rays.directions.size()) +
+                              " directions, " + std::to_string(rays.distances.size()) + " distances, " +
+                              std::to_string(rays.views.size()) + " views",
+                          "spans of one length");
+  }
+  constexpr std::size_t kMinRays = 16;
+  if (n < kMinRays) throw InvalidArgument("rays", std::to_string(n), "at least 16");
+  if (!detail::is_finite(origin))
+    throw InvalidArgument("origin", detail::vec_text(origin), "finite coordinates");
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::string index = "[" + std::to_string(i) + "]";
+    if (!detail::is_finite(rays.positions[i])) {
+      throw InvalidArgument("positions" + index, detail::vec_text(rays.positions[i]), "finite coordinates");
+    }
+    if (!detail::is_finite(rays.directions[i]) || rays.directions[i] == glm::vec3(0.0F)) {
+      throw InvalidArgument("directions" + index, detail::vec_text(rays.directions[i]), "a length > 0");
+    }
+    if (!(rays.distances[i] > 0)) {
+      throw InvalidArgument("distances" + index, std::to_string(rays.distances[i]), "a distance > 0");
+    }
+  }
+  if (!(options.tolerance >= 0)) throw InvalidArgument("tolerance", std::to_string(options.tolerance), "≥ 0");
+  if (!(options.negligible_angle >= 0)) {
+    throw InvalidArgument("negligible_angle", std::to_string(options.negligible_angle), "≥ 0");
+  }
+  if (options.max_rays_per_view < kMinRays) {
+    throw InvalidArgument("max_rays_per_view", std::to_string(options.max_rays_per_view), "at least 16");
+  }
+}
+
+std::string angle_text(double radians) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g mrad", 1e3 * radians);
+  return text;
+}
+
+std::string explain(const ProxyChoice& choice, std::size_t best, const ProxyChoiceOptions& options) {
+  const ProxyCandidate& chosen = choice.best();
+  std::string text = chosen.name + ": predicted off-view error " + angle_text(chosen.off_view_error);
+  if (choice.chosen != best) {
+    const ProxyCandidate& least = choice.candidates[best];
+    text += ", the simplest shape " +
+            (chosen.off_view_error <= options.negligible_angle
+                 ? "below the negligible " + angle_text(options.negligible_angle)
+                 : "within " + std::to_string(std::lround(100 * options.tolerance)) + " % of the best") +
+            " (" + least.name + ", " + angle_text(least.off_view_error) + ")";
+  } else {
+    text += ", the least of all shapes";
+  }
+  std::string simpler;
+  for (std::size_t i = 0; i < choice.chosen; ++i) {
+    const ProxyCandidate& candidate = choice.candidates[i];
+    simpler += (simpler.empty() ? "" : ", ") + candidate.name + " " + angle_text(candidate.off_view_error);
+  }
+  return text + (simpler.empty() ? "." : "; simpler ones are worse: " + simpler + ".");
+}
+
+}  // namespace
+
+ProxyChoice choose_proxy(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOptions& options) {
+  check(rays, origin, options);
+
+  // An even selection of each view's rays; a single view becomes two by alternating.
+  std::map<int, std::vector<std::size_t>> rays_of_view;
+  for (std::size_t i = 0; i < rays.views.size(); ++i) rays_of_view[rays.views[i]].push_back(i);
+  Problem all;
+  all.origin = origin;
+  std::vector<std::size_t> fold_of_ray;
+  std::vector<glm::vec3> hits;
+  std::vector<double> hit_distances;
+  std::size_t view_number = 0;
+  for (const auto& [view, indices] : rays_of_view) {
+    const std::size_t count = std::min(indices.size(), options.max_rays_per_view);
+    for (std::size_t j = 0; j < count; ++j) {
+      const std::size_t i = indices[j * indices.size() / count];
+      const glm::dvec3 p(rays.positions[i]);
+      const glm::dvec3 d(rays.directions[i]);
+      glm::dvec3 target = glm::normalize(d);
+      if (std::isfinite(rays.distances[i])) {
+        const glm::dvec3 hit = p + static_cast<double>(rays.distances[i]) * target;
+        const glm::dvec3 seen = hit - glm::dvec3(origin);
+        const double distance = glm::length(seen);
+        if (!(distance > 0)) continue;  // nothing can be said of a hit at the origin
+        target = seen / distance;
+        hits.emplace_back(hit);
+        hit_distances.push_back(distance);
+      }
+      all.positions.push_back(p);
+      all.directions.push_back(d);
+      all.targets.push_back(target);
+      fold_of_ray.push_back(rays_of_view.size() > 1 ? view_number : j % 2);
+    }
+    ++view_number;
+  }
+  const std::size_t folds = rays_of_view.size() > 1 ? rays_of_view.size() : 2;
+  if (!hit_distances.empty()) {
+    const auto middle = hit_distances.begin() + static_cast<std::ptrdiff_t>(hit_distances.size() / 2);
+    std::nth_element(hit_distances.begin(), middle, hit_distances.end());
+    all.scale = *middle;
+  }
+
+  ProxyChoice choice;
+  // A few steps show which start leads where; the best one is followed to the end.
+  constexpr int kFirstSteps = 10;
+  constexpr int kMaxSteps = 60;
+  for (const Family& family : kFamilies) {
+    if (family.shape != Shape::infinite && hits.empty()) continue;
+    Fit best;
+    const std::vector<Parameters> candidates = starts(family, all, hits);
+    std::vector<Fit> fits(candidates.size());
+    parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) fits[i] = fit_shape(family, all, candidates[i], kFirstSteps);
+    });
+    for (const Fit& fit : fits) {
+      if (fit.cost < best.cost) best = fit;
+    }
+    if (!std::isfinite(best.cost)) continue;  // no start has the origin inside
+    best = fit_shape(family, all, best.parameters, kMaxSteps);
+
+    // Each fold starts from the fit to everything: what is left to predict is the shape, not which local minimum the
+    // search finds.
+    std::vector<double> sums(folds, 0.0);
+    parallel_for(folds, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t fold = begin; fold < end; ++fold) {
+        Problem seen, unseen;
+        seen.origin = unseen.origin = all.origin;
+        seen.scale = unseen.scale = all.scale;
+        for (std::size_t i = 0; i < fold_of_ray.size(); ++i)
+          (fold_of_ray[i] == fold ? unseen : seen).add(all, i);
+        if (unseen.positions.empty() || seen.positions.empty()) continue;
+        const Fit fit = fit_shape(family, seen, best.parameters, kMaxSteps);
+        sums[fold] = mean_angle(unseen, make_proxy(family, fit.parameters, origin, all.scale)) *
+                     static_cast<double>(unseen.positions.size());
+      }
+    });
+    double sum = 0;
+    for (double fold_sum : sums) sum += fold_sum;
+    ProxyCandidate candidate;
+    candidate.name = family.name;
+    candidate.parameters = family.parameters;
+    candidate.proxy = make_proxy(family, best.parameters, origin, all.scale);
+    candidate.fit_error = mean_angle(all, candidate.proxy);
+    candidate.off_view_error = sum / static_cast<double>(all.positions.size());
+    choice.candidates.push_back(std::move(candidate));
+  }
+
+  const auto least =
+      std::min_element(choice.candidates.begin(), choice.candidates.end(),
+                       [](const auto& a, const auto& b) { return a.off_view_error < b.off_view_error; });
+  const double limit = std::max((1.0 + options.tolerance) * least->off_view_error, options.negligible_angle);
+  const auto chosen =
+      std::find_if(choice.candidates.begin(), choice.candidates.end(),
+                   [&](const ProxyCandidate& candidate) { return candidate.off_view_error <= limit; });
+  choice.chosen = static_cast<std::size_t>(chosen - choice.candidates.begin());
+  choice.reason = explain(choice, static_cast<std::size_t>(least - choice.candidates.begin()), options);
+  return choice;
+}
+
+}  // namespace mirrorbake

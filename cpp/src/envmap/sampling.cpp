@@ -1,0 +1,213 @@
+#include "mirrorbake/envmap/sampling.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/envmap/texel_lookup.hpp"
+
+namespace mirrorbake {
+namespace {
+
+// Change of the position in texels of the finest level that a change of the direction causes.
+struct TexelDifferentials {
+  glm::dvec2 dx, dy;
+};
+
+TexelDifferentials texel_differentials(const EnvMapLayout& layout, const MapPoint& point,
+                                       glm::dvec3 direction, glm::dvec3 ddx, glm::dvec3 ddy) {
+  const MapJacobian j = map_jacobian(layout.projection, point.face, point.x, point.y);
+  // Least squares J (x, y) = d: the metric of the map, bounded away from zero at a pole, where x has no effect.
+  const double smallest = 1e-9;
+  const double a = std::max(glm::dot(j.dx, j.dx), smallest);
+  const double b = glm::dot(j.dx, j.dy);
+  const double c = std::max(glm::dot(j.dy, j.dy), smallest);
+  const double determinant = std::max(a * c - b * b, smallest * smallest);
+  const double length = glm::length(direction);
+  const auto solve = [&](glm::dvec3 dd) {
+    const double u = glm::dot(j.dx, dd) / length;
+    const double v = glm::dot(j.dy, dd) / length;
+    glm::dvec2 texels((c * u - b * v) / determinant * 0.5 * layout.width,
+                      (b * u - a * v) / determinant * 0.5 * layout.height);
+    const double longest = 2.0 * (layout.width + layout.height);
+    const double size = glm::length(texels);
+    if (!(size <= longest))
+      texels = std::isfinite(size) ? texels * (longest / size) : glm::dvec2(longest, 0.0);
+    return texels;
+  };
+  return {solve(ddx), solve(ddy)};
+}
+
+struct Sampler {
+  const EnvMapView& map;
+  const SampleOptions& options;
+  std::vector<double> value;
+  std::vector<double> part;
+
+  Sampler(const EnvMapView& map_, const SampleOptions& options_)
+      : map(map_),
+        options(options_),
+        value(static_cast<std::size_t>(map_.layout.channels)),
+        part(static_cast<std::size_t>(map_.layout.channels)) {}
+
+  glm::dvec2 position(const MapPoint& point, int level) const {
+    return {0.5 * (point.x + 1.0) * map.layout.level_width(level),
+            0.5 * (1.0 - point.y) * map.layout.level_height(level)};
+  }
+
+  void nearest(const MapPoint& point) {
+    const EnvMapLayout& layout = map.layout;
+    const float* texel = map.values.data() + layout.index(0, point.face, texel_index(-point.y, layout.height),
+                                                          texel_index(point.x, layout.width));
+    for (std::size_t c = 0; c < value.size(); ++c) value[c] = static_cast<double>(texel[c]);
+  }
+
+  void bilinear(const MapPoint& point, int level, std::vector<double>& result) const {
+    const glm::dvec2 p = position(point, level);
+    interpolate(map, level, point.face, p.x, p.y, result);
+  }
+
+  template <typename Lookup>
+  void between_levels(double lod, Lookup&& lookup) {
+    const double clamped = std::clamp(lod, 0.0, static_cast<double>(map.layout.levels - 1));
+    const int level = static_cast<int>(clamped);
+    const double fraction = clamped - level;
+    lookup(level, value);
+    if (fraction == 0.0) return;
+    lookup(level + 1, part);
+    for (std::size_t c = 0; c < value.size(); ++c)
+      value[c] = (1.0 - fraction) * value[c] + fraction * part[c];
+  }
+
+  void trilinear(const MapPoint& point, const TexelDifferentials& d) {
+    const double longest = std::sqrt(std::max(glm::dot(d.dx, d.dx), glm::dot(d.dy, d.dy)));
+    between_levels(longest > 1.0 ? std::log2(longest) : 0.0,
+                   [&](int level, std::vector<double>& result) { bilinear(point, level, result); });
+  }
+
+  void ewa(const MapPoint& point, TexelDifferentials d) {
+    // Semi-axes of the ellipse that the two differentials span, by the singular values of their matrix.
+    const double sum = glm::dot(d.dx, d.dx) + glm::dot(d.dy, d.dy);
+    const double cross = d.dx.x * d.dy.y - d.dx.y * d.dy.x;
+    const double root = std::sqrt(std::max(0.0, 0.25 * sum * sum - cross * cross));
+    const double major = std::sqrt(0.5 * sum + root);
+    double minor = major > 0.0 ? std::abs(cross) / major : 0.0;
+    double widen = 0.0;
+    if (minor * options.max_anisotropy < major) {
+      const double wanted = major / options.max_anisotropy;
+      widen = wanted * wanted - minor * minor;
+      minor = wanted;
+    }
+    const double lod = minor > 1.0 ? std::log2(minor) : 0.0;
+    if (lod >= map.layout.levels - 1) {
+      between_levels(lod, [&](int level, std::vector<double>& result) { bilinear(point, level, result); });
+      return;
+    }
+    between_levels(lod, [&](int level, std::vector<double>& result) {
+      const double scale = 1.0 / static_cast<double>(1 << level);
+      average_ellipse(point, level, {d.dx * scale, d.dy * scale}, widen * scale * scale, result);
+    });
+  }
+
+  // The 1 that is added to the squares is the filter of the texels themselves, so that an ellipse smaller than a texel
+  // still interpolates; `widen` bounds the anisotropy.
+  void average_ellipse(const MapPoint& point, int level, const TexelDifferentials& d, double widen,
+                       std::vector<double>& result) const {
+    const double xx = d.dx.x * d.dx.x + d.dy.x * d.dy.x + 1.0 + widen;
+    const double yy = d.dx.y * d.dx.y + d.dy.y * d.dy.y + 1.0 + widen;
+    const double xy = d.dx.x * d.dx.y + d.dy.x * d.dy.y;
+    const double determinant = xx * yy - xy * xy;
+    const glm::dvec2 center = position(point, level) - 0.5;
+    const double radius_x = std::sqrt(xx);
+    const double radius_y = std::sqrt(yy);
+    // A Gaussian that has fallen to e⁻² at the rim of the ellipse and is cut there.
+    constexpr double kFalloff = 2.0;
+    const double at_rim = std::exp(-kFalloff);
+    double weight = 0.0;
+    std::fill(result.begin(), result.end(), 0.0);
+    for (int row = static_cast<int>(std::ceil(center.y - radius_y)); row <= center.y + radius_y; ++row) {
+      const double y = row - center.y;
+      for (int column = static_cast<int>(std::ceil(center.x - radius_x)); column <= center.x + radius_x;
+           ++column) {
+        const double x = column - center.x;
+        const double r2 = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant;
+        if (r2 >= 1.0) continue;
+        const double w = std::exp(-kFalloff * r2) - at_rim;
+        const float* texel = map.values.data() + texel_at(map.layout, level, point.face, row, column);
+        weight += w;
+        for (std::size_t c = 0; c < result.size(); ++c) result[c] += w * static_cast<double>(texel[c]);
+      }
+    }
+    if (weight > 0.0) {
+      for (double& v : result) v /= weight;
+    } else {
+      bilinear(point, level, result);
+    }
+  }
+};
+
+}  // namespace
+
+SampleFilter parse_sample_filter(std::string_view name) {
+  if (name == "nearest") return SampleFilter::nearest;
+  if (name == "bilinear") return SampleFilter::bilinear;
+  if (name == "trilinear") return SampleFilter::trilinear;
+  if (name == "ewa") return SampleFilter::ewa;
+  throw InvalidArgument("filter", name, "nearest, bilinear, trilinear or ewa");
+}
+
+std::size_t sample(const EnvMapView& map, std::span<const glm::vec3> directions,
+                   std::span<const glm::vec3> ddx, std::span<const glm::vec3> ddy,
+                   const SampleOptions& options, std::span<float> values) {
+  validate(map);
+  const std::size_t channels = static_cast<std::size_t>(map.layout.channels);
+  if (values.size() != directions.size() * channels) {
+    throw InvalidArgument("values", std::to_string(values.size()) + " numbers",
+                          std::to_string(directions.size() * channels));
+  }
+  const bool needs_differentials =
+      options.filter == SampleFilter::trilinear || options.filter == SampleFilter::ewa;
+  if (needs_differentials && (ddx.size() != directions.size() || ddy.size() != directions.size())) {
+    throw InvalidArgument("ddx, ddy", "of another length",
+                          std::to_string(directions.size()) + " differentials each");
+  }
+  if (!(options.max_anisotropy >= 1.0)) {
+    throw InvalidArgument("max_anisotropy", std::to_string(options.max_anisotropy), "at least 1");
+  }
+  std::atomic<std::size_t> unusable{0};
+  parallel_for(directions.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    Sampler sampler(map, options);
+    for (std::size_t i = begin; i < end; ++i) {
+      const glm::dvec3 d(directions[i]);
+      const MapPoint point = point_from_direction(map.layout.projection, d);
+      const std::span<float> result = values.subspan(i * channels, channels);
+      if (!point.covered) {
+        const double length = glm::length(d);
+        if (!(length > 0.0) || !std::isfinite(length)) ++unusable;
+        std::fill(result.begin(), result.end(), 0.0F);
+        continue;
+      }
+      TexelDifferentials differentials{};
+      if (needs_differentials) {
+        differentials = texel_differentials(map.layout, point, d, glm::dvec3(ddx[i]), glm::dvec3(ddy[i]));
+      }
+      switch (options.filter) {
+        case SampleFilter::nearest: sampler.nearest(point); break;
+        case SampleFilter::bilinear: sampler.bilinear(point, 0, sampler.value); break;
+        case SampleFilter::trilinear: sampler.trilinear(point, differentials); break;
+        case SampleFilter::ewa: sampler.ewa(point, differentials); break;
+      }
+      for (std::size_t c = 0; c < channels; ++c) result[c] = static_cast<float>(sampler.value[c]);
+    }
+  });
+  return unusable;
+}
+
+}  // namespace mirrorbake

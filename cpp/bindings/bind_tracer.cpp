@@ -124,7 +124,8 @@ void bind_tracer(nb::module_& m) {
           nb::arg("cache_rays") = TracerOptions{}.cache_rays,
           nb::arg("cache_bounces") = TracerOptions{}.cache_bounces, nb::arg("seed") = TracerOptions{}.seed)
       .def_rw("indirect", &TracerOptions::indirect)
-      .def_rw("cache_rays", &TracerOptions::cache_rays, "Gather rays per vertex and bounce, 1 to 65536.")
+      .def_rw("cache_rays", &TracerOptions::cache_rays,
+              "Gather rays per vertex, 1 to 65536; a quarter after the first bounce.")
       .def_rw("cache_bounces", &TracerOptions::cache_bounces, "Diffuse bounces of the cache, 1 to 16.")
       .def_rw("seed", &TracerOptions::seed, "Of the cache.");
 

@@ -1,9 +1,9 @@
 #include "mirrorbake/tracer/camera.hpp"
 
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <numbers>
 #include <string>
+#include <glm/geometric.hpp>
 
 #include "camera_rays.hpp"
 #include "mirrorbake/core/error.hpp"
@@ -60,9 +60,7 @@ CameraRays::CameraRays(const Camera& camera) {
   down_ = glm::vec3(-up * pixel);
 }
 
-glm::vec3 CameraRays::direction(glm::vec2 point) const {
-  return glm::normalize(unnormalised(point));
-}
+glm::vec3 CameraRays::direction(glm::vec2 point) const { return glm::normalize(unnormalised(point)); }
 
 CameraRays::Direction CameraRays::direction_with_differentials(glm::vec2 point) const {
   const glm::vec3 d = unnormalised(point);

@@ -1,9 +1,9 @@
 #pragma once
 
+#include <numbers>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <numbers>
 
 #include "integrator.hpp"
 #include "world.hpp"
@@ -21,10 +21,7 @@ struct TriangleCorner {
 inline glm::vec3 face_normal(const World& world, std::uint32_t object, std::uint32_t triangle) {
   const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(object));
   const glm::uvec3 t = world.scene.objects[object].mesh.triangles[triangle];
-  const glm::dvec3 a = p[t.x];
-  const glm::dvec3 n = glm::cross(glm::dvec3(p[t.y]) - a, glm::dvec3(p[t.z]) - a);
-  const double length = glm::length(n);
-  return length > 0.0 ? glm::vec3(n / length) : glm::vec3(0.0F);
+  return triangle_normal(p[t.x], p[t.y], p[t.z]);
 }
 
 /// A random point of the triangle near one of its corners, seen from the side of `towards`. At the corner

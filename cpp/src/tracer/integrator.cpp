@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numbers>
 
 #include "world.hpp"
 

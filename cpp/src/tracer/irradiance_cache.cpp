@@ -1,10 +1,11 @@
 #include "irradiance_cache.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numbers>
 
 #include "gather.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -15,6 +16,10 @@ namespace {
 
 // Rays after which a hemisphere inside a closed body is given up.
 constexpr int kProbeRays = 16;
+// Later passes gather light that is dimmer and smoother than the first one's: a quarter of the rays will do.
+constexpr int kLaterShare = 4;
+// Points around a vertex from which its rays start in turn.
+constexpr std::uint32_t kStartPoints = 16;
 // Corners of a flat-shaded mesh share a slot if their faces differ by less than acos(0.999) = 2.6°.
 constexpr float kSameFace = 0.999F;
 
@@ -95,61 +100,78 @@ glm::vec3 IrradianceCache::interpolate(const Sides& values, const Surface& surfa
          surface.barycentric.x * value[slot[1]] + surface.barycentric.y * value[slot[2]];
 }
 
+template <typename IrradianceAt>
+IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std::size_t slot, int side,
+                                                         int rays, const IrradianceAt& irradiance_at) const {
+  const std::uint32_t first = first_corner_[slot];
+  const std::uint32_t count = first_corner_[slot + 1] - first;
+  const std::uint64_t number = 2 * slot + static_cast<std::size_t>(side);
+  std::array<Surface, kStartPoints> starts;
+  const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
+  for (std::uint32_t i = 0; i < start_count; ++i) {
+    const SampleStream stream = sample_stream(world.options.seed, number, i);
+    const TriangleCorner& corner = corners_[first + i % count];
+    const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
+    starts[i] = surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), side == 0 ? n : -n);
+  }
+
+  SlotGather result;
+  int traced = 0;
+  int dark = 0;
+  int nothing = 0;
+  for (int r = 0; r < rays; ++r) {
+    const bool hopeless = dark == traced || (side == 1 && dark + nothing == traced);
+    if (r == kProbeRays && hopeless) {
+      result.given_up = true;
+      break;
+    }
+    const auto index = static_cast<std::uint32_t>(r);
+    const SampleStream stream = sample_stream(world.options.seed, number, index);
+    const Surface& start = starts[index % start_count];
+    const glm::vec3 direction =
+        sample_cosine_hemisphere(Frame(start.normal), stream.get(dimension_base(0, 0) + diffuse_dimension));
+    if (!(glm::dot(direction, start.geometric_normal) > 0.0F)) continue;
+    const Gathered gathered =
+        gather_along(world, {offset_origin(start, direction), direction}, stream, irradiance_at);
+    result.irradiance += gathered.radiance;
+    dark += gathered.dark_back_side ? 1 : 0;
+    nothing += gathered.nothing ? 1 : 0;
+    ++traced;
+  }
+  result.irradiance *= std::numbers::pi_v<float> / static_cast<float>(rays);
+  result.buried = 2 * dark > traced;
+  return result;
+}
+
 void IrradianceCache::gather(const World& world) {
   const std::size_t slots = first_corner_.size() - 1;
-  const int rays = world.options.cache_rays;
-  const int probes = std::min(rays, kProbeRays);
-  Sides previous;
   std::vector<std::uint8_t> buried[2];
-  std::vector<std::uint8_t> skipped[2];
+  std::vector<std::uint8_t> given_up[2];
   for (int side = 0; side < 2; ++side) {
     total_.side[side].assign(slots, glm::vec3(0.0F));
     buried[side].assign(slots, 0);
-    skipped[side].assign(slots, 0);
+    given_up[side].assign(slots, 0);
   }
 
+  Sides previous;
   for (int pass = 0; pass < world.options.cache_bounces; ++pass) {
-    const auto irradiance_at = [&](const Surface& surface, glm::vec2 u) {
-      return pass == 0 ? direct_irradiance(world, surface, u, false) : interpolate(previous, surface);
-    };
+    const auto direct = [&](const Surface& s, glm::vec2 u) { return direct_irradiance(world, s, u, false); };
+    const auto indirect = [&](const Surface& s, glm::vec2) { return interpolate(previous, s); };
+    const int rays = pass == 0 ? world.options.cache_rays
+                               : std::max(world.options.cache_rays / kLaterShare,
+                                          std::min(world.options.cache_rays, kProbeRays));
     Sides found;
     for (int side = 0; side < 2; ++side) {
       found.side[side].assign(slots, glm::vec3(0.0F));
       parallel_for(slots, 32, [&](std::size_t begin, std::size_t end) {
         for (std::size_t slot = begin; slot < end; ++slot) {
-          if (skipped[side][slot] != 0) continue;
-          const std::uint32_t first = first_corner_[slot];
-          const std::uint32_t count = first_corner_[slot + 1] - first;
-          glm::vec3 sum(0.0F);
-          int traced = 0;
-          int dark = 0;
-          int nothing = 0;
-          for (int r = 0; r < rays; ++r) {
-            // Inside a closed body, or on a back that faces nothing at all.
-            if (pass == 0 && r == probes && (dark == traced || (side == 1 && dark + nothing == traced))) {
-              skipped[side][slot] = 1;
-              break;
-            }
-            const auto index = static_cast<std::uint32_t>(r);
-            const SampleStream stream =
-                sample_stream(world.options.seed, 2 * slot + static_cast<std::size_t>(side), index);
-            const TriangleCorner& corner = corners_[first + index % count];
-            const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
-            if (n == glm::vec3(0.0F)) continue;
-            const Surface start =
-                surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), side == 0 ? n : -n);
-            const glm::vec3 direction = sample_cosine_hemisphere(
-                Frame(start.normal), stream.get(dimension_base(0, 0) + diffuse_dimension));
-            if (!(glm::dot(direction, start.geometric_normal) > 0.0F)) continue;
-            const Gathered gathered =
-                gather_along(world, {offset_origin(start, direction), direction}, stream, irradiance_at);
-            sum += gathered.radiance;
-            dark += gathered.dark_back_side ? 1 : 0;
-            nothing += gathered.nothing ? 1 : 0;
-            ++traced;
-          }
-          found.side[side][slot] = sum * (std::numbers::pi_v<float> / static_cast<float>(rays));
-          if (pass == 0) buried[side][slot] = 2 * dark > traced ? 1 : 0;
+          if (given_up[side][slot] != 0) continue;
+          const SlotGather gathered = pass == 0 ? gather_slot(world, slot, side, rays, direct)
+                                                : gather_slot(world, slot, side, rays, indirect);
+          found.side[side][slot] = gathered.irradiance;
+          if (pass > 0) continue;
+          buried[side][slot] = gathered.buried ? 1 : 0;
+          given_up[side][slot] = gathered.given_up ? 1 : 0;
         }
       });
       fill_buried(found.side[side], buried[side]);

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/vec3.hpp>
 #include <vector>
+#include <glm/vec3.hpp>
 
 #include "surface.hpp"
 
@@ -39,6 +39,15 @@ class IrradianceCache {
 
   void assign_slots(const World& world);
   glm::vec3 interpolate(const Sides& values, const Surface& surface) const;
+  /// One pass's irradiance on one side of a slot.
+  struct SlotGather {
+    glm::vec3 irradiance{0.0F};
+    bool buried = false;    ///< most rays hit the dark inside of a body
+    bool given_up = false;  ///< the first rays found that, or, on a back side, nothing at all
+  };
+  template <typename IrradianceAt>
+  SlotGather gather_slot(const World& world, std::size_t slot, int side, int rays,
+                         const IrradianceAt& irradiance_at) const;
   /// Adds up what the passes bring.
   void gather(const World& world);
   void fill_buried(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
-#include <string>
-#include <utility>
 
 #include "camera_rays.hpp"
 #include "integrator.hpp"

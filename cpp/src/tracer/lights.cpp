@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numbers>
 
 #include "surface.hpp"
 
@@ -65,10 +65,11 @@ struct SphericalRectangle {
     x1 = x0 + width;
     y1 = y0 + height;
     // z components of the normals of the four planes through the point and an edge.
-    const double n0 = -y0 / std::hypot(y0, z0);
-    const double n1 = x1 / std::hypot(x1, z0);
-    const double n2 = y1 / std::hypot(y1, z0);
-    const double n3 = -x0 / std::hypot(x0, z0);
+    const auto length = [](double a, double b) { return std::sqrt(a * a + b * b); };
+    const double n0 = -y0 / length(y0, z0);
+    const double n1 = x1 / length(x1, z0);
+    const double n2 = y1 / length(y1, z0);
+    const double n3 = -x0 / length(x0, z0);
     const auto angle = [](double a, double b) { return std::acos(std::clamp(-a * b, -1.0, 1.0)); };
     b0 = n0;
     b1 = n2;
@@ -83,9 +84,9 @@ struct SphericalRectangle {
     cu = std::clamp(cu, -1.0, 1.0);
     double xu = -(cu * z0) / std::max(1e-12, std::sqrt(1.0 - cu * cu));
     xu = std::clamp(xu, x0, x1);
-    const double d = std::hypot(xu, z0);
-    const double h0 = y0 / std::hypot(d, y0);
-    const double h1 = y1 / std::hypot(d, y1);
+    const double d = std::sqrt(xu * xu + z0 * z0);
+    const double h0 = y0 / std::sqrt(d * d + y0 * y0);
+    const double h1 = y1 / std::sqrt(d * d + y1 * y1);
     const double hv = h0 + s.y * (h1 - h0);
     const double yv = hv * hv < 1.0 - 1e-12 ? hv * d / std::sqrt(1.0 - hv * hv) : y1;
     return xu * x + yv * y + z0 * z;  // relative to the point
@@ -95,7 +96,7 @@ struct SphericalRectangle {
 // By area when the rectangle is small and far, where the two densities agree and the angles lose their
 // digits.
 bool by_solid_angle(glm::vec3 centre, float diagonal, bool orthogonal, glm::vec3 position) {
-  return orthogonal && glm::length(centre - position) < 2.0F * diagonal;
+  return orthogonal && glm::length(centre - position) < diagonal;
 }
 
 }  // namespace
@@ -278,9 +279,7 @@ std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u) const
   const auto index = static_cast<std::size_t>(light.index);
   std::optional<LightSample> sample;
   switch (light.kind) {
-    case Kind::rectangle:
-      sample = sample_rectangle(rectangles_[index], position, u);
-      break;
+    case Kind::rectangle: sample = sample_rectangle(rectangles_[index], position, u); break;
     case Kind::point: {
       const glm::vec3 to = points_[index].position - position;
       const float distance = glm::length(to);

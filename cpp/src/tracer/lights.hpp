@@ -1,9 +1,9 @@
 #pragma once
 
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
 #include <optional>
 #include <vector>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
 #include "mirrorbake/scene/scene.hpp"
 #include "ray_scene.hpp"

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <string>
 
 #include "mirrorbake/core/error.hpp"
 

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/vec3.hpp>
 #include <limits>
 #include <memory>
 #include <span>
 #include <vector>
+#include <glm/vec3.hpp>
 
 #include "embree_device.hpp"
 #include "mirrorbake/scene/scene.hpp"

@@ -2,10 +2,10 @@
 
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <numbers>
 
 #include "mirrorbake/core/sampling.hpp"
 

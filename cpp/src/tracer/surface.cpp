@@ -14,9 +14,7 @@ namespace {
 // Light Transport Simulation and Rendering System, 2017, appendix A.3).
 constexpr float kLowestReflection = 0.01F;  // cosine to the geometric normal
 
-glm::vec3 reflect_about(glm::vec3 view, glm::vec3 n) {
-  return 2.0F * glm::dot(n, view) * n - view;
-}
+glm::vec3 reflect_about(glm::vec3 view, glm::vec3 n) { return 2.0F * glm::dot(n, view) * n - view; }
 
 glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
   if (const float c = glm::dot(n, view); c < 0.0F) n = glm::normalize(n - c * view);
@@ -30,14 +28,17 @@ glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
   return length > 0.0F ? half / length : geometric;
 }
 
-// In double: the cross product of two edges of 1e-10 m underflows in float.
-glm::vec3 triangle_normal(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
-  const glm::dvec3 n = glm::cross(b - a, c - a);
-  const double length = glm::length(n);
-  return length > 0.0 ? glm::vec3(n / length) : glm::vec3(0.0F, 1.0F, 0.0F);
-}
-
 }  // namespace
+
+glm::vec3 triangle_normal(glm::vec3 a, glm::vec3 b, glm::vec3 c) {
+  const glm::vec3 n = glm::cross(b - a, c - a);
+  const float square = glm::dot(n, n);
+  if (square > 1e-30F && square < 1e30F) return n / std::sqrt(square);
+  // Edges below a tenth of a millimetre: the square underflows in float.
+  const glm::dvec3 exact = glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a));
+  const double length = glm::length(exact);
+  return length > 0.0 ? glm::vec3(exact / length) : glm::vec3(0.0F);
+}
 
 glm::vec3 texture_lookup(const Image& texture, glm::vec2 uv) {
   const auto wrap = [](float x) { return x - std::floor(x); };

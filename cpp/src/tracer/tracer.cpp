@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <numbers>
 #include <string>
 #include <utility>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "camera_rays.hpp"
 #include "integrator.hpp"
@@ -85,9 +85,7 @@ Tracer::~Tracer() = default;
 Tracer::Tracer(Tracer&&) noexcept = default;
 Tracer& Tracer::operator=(Tracer&&) noexcept = default;
 
-const Scene& Tracer::scene() const {
-  return state_->world.scene;
-}
+const Scene& Tracer::scene() const { return state_->world.scene; }
 
 Image Tracer::trace_beauty(const Camera& camera, const TraceOptions& options) const {
   validate(camera);

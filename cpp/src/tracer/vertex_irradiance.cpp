@@ -1,6 +1,6 @@
-#include <glm/geometric.hpp>
 #include <numbers>
 #include <vector>
+#include <glm/geometric.hpp>
 
 #include "gather.hpp"
 #include "mirrorbake/core/parallel.hpp"

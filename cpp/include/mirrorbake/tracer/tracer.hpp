@@ -24,7 +24,7 @@ enum class IndirectLight { none, cached, path };
 
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
-  int cache_rays = 256;      ///< gather rays per vertex and bounce of the `cached` indirect light, 1…65536
+  int cache_rays = 64;       ///< gather rays per vertex of the `cached` indirect light, 1…65536; a quarter after the first bounce
   int cache_bounces = 3;     ///< diffuse bounces that `cached` follows, 1…16
   std::uint64_t seed = 0;    ///< of the cache
 };

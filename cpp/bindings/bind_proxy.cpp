@@ -1,5 +1,6 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include <cmath>
 #include <cstdint>
@@ -13,7 +14,9 @@
 
 #include "bind.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/proxy/choose.hpp"
 #include "mirrorbake/proxy/fit.hpp"
+#include "mirrorbake/proxy/hull.hpp"
 #include "mirrorbake/proxy/proxy.hpp"
 
 namespace mirrorbake::bindings {
@@ -66,8 +69,9 @@ Field shape_field(const Proxy& proxy, const char* field, Get get) {
 template <typename Real>
 using RayArray = nb::ndarray<const Real, nb::c_contig, nb::device::cpu>;
 
+/// Two finite arrays of one shape (..., 3).
 template <typename Real>
-void check_rays(const RayArray<Real>& positions, const RayArray<Real>& directions) {
+void check_rays(const RayArray<Real>& positions, const char* second, const RayArray<Real>& directions) {
   const auto shape_text = [](const RayArray<Real>& array) {
     std::string text = "(";
     for (std::size_t i = 0; i < array.ndim(); ++i)
@@ -86,31 +90,45 @@ void check_rays(const RayArray<Real>& positions, const RayArray<Real>& direction
     }
   };
   check("positions", positions);
-  check("directions", directions);
+  check(second, directions);
   bool same = positions.ndim() == directions.ndim();
   for (std::size_t i = 0; same && i < positions.ndim(); ++i) same = positions.shape(i) == directions.shape(i);
-  if (!same)
-    throw InvalidArgument("directions", "of shape " + shape_text(directions), "the shape of positions");
+  if (!same) throw InvalidArgument(second, "of shape " + shape_text(directions), "the shape of positions");
+}
+
+/// Calls `compute(first, second, results)` on arrays of xyz triples and returns the results in their shape.
+template <typename Real, typename Compute>
+nb::ndarray<nb::numpy, Real> map_triples(const RayArray<Real>& first, const RayArray<Real>& second,
+                                         Compute compute) {
+  using Vector = glm::vec<3, Real>;
+  const std::size_t count = first.size() / 3;
+  auto* results = new std::vector<Real>(first.size());
+  nb::capsule owner(results, [](void* p) noexcept { delete static_cast<std::vector<Real>*>(p); });
+  {
+    nb::gil_scoped_release release;
+    compute(std::span(reinterpret_cast<const Vector*>(first.data()), count),
+            std::span(reinterpret_cast<const Vector*>(second.data()), count),
+            std::span(reinterpret_cast<Vector*>(results->data()), count));
+  }
+  std::vector<std::size_t> shape;
+  for (std::size_t i = 0; i < first.ndim(); ++i) shape.push_back(first.shape(i));
+  return nb::ndarray<nb::numpy, Real>(results->data(), shape.size(), shape.data(), owner);
 }
 
 template <typename Real>
 nb::ndarray<nb::numpy, Real> lookup(const Proxy& proxy, const RayArray<Real>& positions,
                                     const RayArray<Real>& directions) {
-  using Vector = glm::vec<3, Real>;
-  check_rays(positions, directions);
-  const std::size_t count = positions.size() / 3;
-  std::vector<Real> lookups(positions.size());
-  {
-    nb::gil_scoped_release release;
-    lookup_directions(proxy, std::span(reinterpret_cast<const Vector*>(positions.data()), count),
-                      std::span(reinterpret_cast<const Vector*>(directions.data()), count),
-                      std::span(reinterpret_cast<Vector*>(lookups.data()), count));
-  }
-  auto* owner = new std::vector<Real>(std::move(lookups));
-  nb::capsule deleter(owner, [](void* p) noexcept { delete static_cast<std::vector<Real>*>(p); });
-  std::vector<std::size_t> shape;
-  for (std::size_t i = 0; i < positions.ndim(); ++i) shape.push_back(positions.shape(i));
-  return nb::ndarray<nb::numpy, Real>(owner->data(), shape.size(), shape.data(), deleter);
+  check_rays(positions, "directions", directions);
+  return map_triples(positions, directions,
+                     [&](auto p, auto d, auto lookups) { lookup_directions(proxy, p, d, lookups); });
+}
+
+nb::ndarray<nb::numpy, float> mirror_lookup(const Proxy& proxy, glm::vec3 eye,
+                                            const RayArray<float>& positions,
+                                            const RayArray<float>& normals) {
+  check_rays(positions, "normals", normals);
+  return map_triples(positions, normals,
+                     [&](auto p, auto n, auto lookups) { mirror_lookups(proxy, eye, p, n, lookups); });
 }
 
 std::span<const glm::vec3> points(const PointArray& array) {
@@ -228,6 +246,24 @@ InvalidArgument
     Shapes that differ or do not end in 3, NaN or infinite values (the row is named).)")
       .def("lookup_float64", &lookup<double>, nb::arg("positions"), nb::arg("directions"),
            "lookup() with float64 coordinates and results.")
+      .def("mirror_lookup", &mirror_lookup, nb::arg("eye"), nb::arg("positions"), nb::arg("normals"),
+           R"(Texture coordinates of a mirror's vertices or pixels ([PEM] section 4).
+
+Lookups along the reflections of the rays from `eye` (x, y, z) to the `positions` about the `normals`.
+
+Parameters
+----------
+positions, normals
+    (..., 3), of one shape, finite, world space; normals of any length > 0.
+
+Returns
+-------
+    Array of the same shape: directions in which the map is read, not normalised.
+
+Raises
+------
+InvalidArgument
+    Shapes that differ or do not end in 3, NaN or infinite values (the row is named).)")
       .def("validate", &validate, "Raises InvalidArgument, naming the field, if the proxy is not usable.")
       .def("__repr__", [](const Proxy& p) {
         const nb::object self = nb::cast(p);
@@ -286,6 +322,84 @@ InvalidArgument
       "Axis-aligned box around `origin` that fits the hits best, by robust (Huber) least squares of their "
       "distances to "
       "its surface.\n\n`hits` (n, 3). Returns a Proxy with the given origin.");
+
+  nb::class_<ProxyCandidate>(m, "ProxyCandidate", "A shape that choose_proxy() fitted.")
+      .def_ro("name", &ProxyCandidate::name,
+              "'infinite', 'sphere', 'hemisphere', 'box', 'ellipsoid', 'rotated box' or 'rotated ellipsoid'.")
+      .def_ro("parameters", &ProxyCandidate::parameters, "Numbers that the fit sets.")
+      .def_ro("proxy", &ProxyCandidate::proxy, "The shape, fitted to all views.")
+      .def_ro("fit_error", &ProxyCandidate::fit_error, "Mean angle over the rays of the fit, radians.")
+      .def_ro("off_view_error", &ProxyCandidate::off_view_error,
+              "Predicted mean angle in other views, by cross-validation over the views, radians.");
+  nb::class_<ProxyChoice>(m, "ProxyChoice", "What choose_proxy() found.")
+      .def_ro("candidates", &ProxyChoice::candidates, "All shapes, in rising order of parameters.")
+      .def_prop_ro("best", &ProxyChoice::best, "The chosen candidate.")
+      .def_ro("reason", &ProxyChoice::reason, "Why, in a sentence.");
+  m.def(
+      "choose_proxy",
+      [](PointArray positions, PointArray directions,
+         nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu> distances,
+         nb::ndarray<const int, nb::ndim<1>, nb::c_contig, nb::device::cpu> views, glm::vec3 origin,
+         double tolerance, double negligible_angle, std::size_t max_rays_per_view) {
+        const TracedRays rays = {points(positions),
+                                 points(directions),
+                                 {distances.data(), distances.size()},
+                                 {views.data(), views.size()}};
+        const ProxyChoiceOptions options = {tolerance, negligible_angle, max_rays_per_view};
+        nb::gil_scoped_release release;
+        return choose_proxy(rays, origin, options);
+      },
+      nb::arg("positions"), nb::arg("directions"), nb::arg("distances"), nb::arg("views"), nb::arg("origin"),
+      nb::arg("tolerance") = ProxyChoiceOptions{}.tolerance,
+      nb::arg("negligible_angle") = ProxyChoiceOptions{}.negligible_angle,
+      nb::arg("max_rays_per_view") = ProxyChoiceOptions{}.max_rays_per_view,
+      R"(Chooses the geometry of a map from traced reflections of a few views.
+
+Fits every shape, predicts how far off its lookups are in views that it was not fitted to (each view is left out in
+turn; a single one is cut in two) and takes the simplest shape within `tolerance` of the best.
+
+Parameters
+----------
+positions, directions
+    (n, 3): rays as they leave the object, world space, metres.
+distances
+    (n,): to the surroundings, metres, > 0; inf for rays that leave the scene.
+views
+    (n,) integers: the view of each ray.
+origin
+    Of the map, world space.
+tolerance
+    Relative excess of error at which a simpler shape is still preferred.
+negligible_angle
+    Errors below it do not count, radians; the default is a tenth of a texel of a cube map of 256 x 256 x 6.
+max_rays_per_view
+    Of each view at most so many rays, evenly spaced, are used.
+
+Returns
+-------
+    ProxyChoice with `best`, `reason` and all `candidates`.
+
+Raises
+------
+InvalidArgument
+    Arrays of different length, fewer than 16 rays, values that are not usable (the index is named).)");
+  m.def(
+      "hull_triangles",
+      [](PointArray positions, TriangleArray triangles, std::optional<PointArray> extremes,
+         double tolerance) {
+        const std::span indices(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0));
+        const std::span<const glm::vec3> hull = extremes ? points(*extremes) : std::span<const glm::vec3>{};
+        std::vector<std::uint8_t> on_hull;
+        {
+          nb::gil_scoped_release release;
+          on_hull = hull_triangles(points(positions), indices, hull, tolerance);
+        }
+        return to_numpy(std::move(on_hull), {indices.size()});
+      },
+      nb::arg("positions"), nb::arg("triangles"), nb::arg("extremes") = nb::none(),
+      nb::arg("tolerance") = kHullTolerance,
+      "1 for every triangle that lies on the mesh's convex hull, else 0; see "
+      "mirrorbake.proxy.hull_triangles.");
 }
 
 }  // namespace mirrorbake::bindings

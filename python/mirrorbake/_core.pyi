@@ -124,6 +124,27 @@ class Proxy:
     def lookup_float64(self, positions: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float64]:
         """lookup() with float64 coordinates and results."""
 
+    def mirror_lookup(self, eye: Sequence[float], positions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+        """
+        Texture coordinates of a mirror's vertices or pixels ([PEM] section 4).
+
+        Lookups along the reflections of the rays from `eye` (x, y, z) to the `positions` about the `normals`.
+
+        Parameters
+        ----------
+        positions, normals
+            (..., 3), of one shape, finite, world space; normals of any length > 0.
+
+        Returns
+        -------
+            Array of the same shape: directions in which the map is read, not normalised.
+
+        Raises
+        ------
+        InvalidArgument
+            Shapes that differ or do not end in 3, NaN or infinite values (the row is named).
+        """
+
     def validate(self) -> None:
         """Raises InvalidArgument, naming the field, if the proxy is not usable."""
 
@@ -155,6 +176,87 @@ def fit_box_robust(hits: Annotated[NDArray[numpy.float32], dict(shape=(None, 3),
     Axis-aligned box around `origin` that fits the hits best, by robust (Huber) least squares of their distances to its surface.
 
     `hits` (n, 3). Returns a Proxy with the given origin.
+    """
+
+class ProxyCandidate:
+    """A shape that choose_proxy() fitted."""
+
+    @property
+    def name(self) -> str:
+        """
+        'infinite', 'sphere', 'hemisphere', 'box', 'ellipsoid', 'rotated box' or 'rotated ellipsoid'.
+        """
+
+    @property
+    def parameters(self) -> int:
+        """Numbers that the fit sets."""
+
+    @property
+    def proxy(self) -> Proxy:
+        """The shape, fitted to all views."""
+
+    @property
+    def fit_error(self) -> float:
+        """Mean angle over the rays of the fit, radians."""
+
+    @property
+    def off_view_error(self) -> float:
+        """
+        Predicted mean angle in other views, by cross-validation over the views, radians.
+        """
+
+class ProxyChoice:
+    """What choose_proxy() found."""
+
+    @property
+    def candidates(self) -> list[ProxyCandidate]:
+        """All shapes, in rising order of parameters."""
+
+    @property
+    def best(self) -> ProxyCandidate:
+        """The chosen candidate."""
+
+    @property
+    def reason(self) -> str:
+        """Why, in a sentence."""
+
+def choose_proxy(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], distances: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], views: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], origin: Sequence[float], tolerance: float = 0.05, negligible_angle: float = 0.0006, max_rays_per_view: int = 1000) -> ProxyChoice:
+    """
+    Chooses the geometry of a map from traced reflections of a few views.
+
+    Fits every shape, predicts how far off its lookups are in views that it was not fitted to (each view is left out in
+    turn; a single one is cut in two) and takes the simplest shape within `tolerance` of the best.
+
+    Parameters
+    ----------
+    positions, directions
+        (n, 3): rays as they leave the object, world space, metres.
+    distances
+        (n,): to the surroundings, metres, > 0; inf for rays that leave the scene.
+    views
+        (n,) integers: the view of each ray.
+    origin
+        Of the map, world space.
+    tolerance
+        Relative excess of error at which a simpler shape is still preferred.
+    negligible_angle
+        Errors below it do not count, radians; the default is a tenth of a texel of a cube map of 256 x 256 x 6.
+    max_rays_per_view
+        Of each view at most so many rays, evenly spaced, are used.
+
+    Returns
+    -------
+        ProxyChoice with `best`, `reason` and all `candidates`.
+
+    Raises
+    ------
+    InvalidArgument
+        Arrays of different length, fewer than 16 rays, values that are not usable (the index is named).
+    """
+
+def hull_triangles(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], extremes: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, tolerance: float = 0.0001) -> NDArray[numpy.uint8]:
+    """
+    1 for every triangle that lies on the mesh's convex hull, else 0; see mirrorbake.proxy.hull_triangles.
     """
 
 class SaveReport:
@@ -716,6 +818,87 @@ class Tracer:
         """
         Irradiance at every vertex of an object's front, (vertices, 3), all light included.
         """
+
+def points_from_directions(projection: str, directions: NDArray[numpy.float32]) -> tuple[NDArray[numpy.int32], NDArray[numpy.float32]]:
+    """
+    Faces (n) and positions (n, 2), x to the right and y up in [-1, 1], of directions (n, 3). Raises
+    InvalidArgument for NaN, infinite and zero directions.
+    """
+
+def directions_from_points(projection: str, faces: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], points: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+    """
+    Unit directions (n, 3) at positions (n, 2) of faces (n). Raises InvalidArgument for faces that do not exist
+    and positions that are not finite.
+    """
+
+def texel_solid_angles(projection: str, width: int, height: int) -> NDArray[numpy.float64]:
+    """
+    Solid angles in steradians of the texels of a face, float64 of shape (height, width). Faces are alike.
+    """
+
+def solid_angle_density(projection: str, face: int, x: float, y: float) -> float:
+    """
+    Solid angle per unit of area of (x, y) at a position of a face, in steradians.
+    """
+
+def dual_paraboloid_texture_matrix(frame_from_map: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)], face: int) -> NDArray[numpy.float32]:
+    """
+    The 4x4 texture matrix of [EMT] eq. 9-12 for the front (0) or back (1) map: applied to (r, 1) it gives
+    (s q, t q, ., q), t downwards.
+    """
+
+class EnvMapLayout:
+    """
+    Order of the values of an environment map: levels, faces, rows, columns, channels.
+    """
+
+    def __init__(self, projection: str, width: int, height: int, levels: int = 1, channels: int = 3) -> None: ...
+
+    @property
+    def projection(self) -> str:
+        """Name of the projection."""
+
+    @property
+    def width(self) -> int:
+        """Texels of a face of the finest level."""
+
+    @property
+    def height(self) -> int:
+        """Texels of a face of the finest level."""
+
+    @property
+    def levels(self) -> int:
+        """Number of levels, counted from the finest."""
+
+    @property
+    def channels(self) -> int:
+        """Values per texel."""
+
+    @property
+    def faces(self) -> int:
+        """Number of faces."""
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+
+    def level_width(self, level: int) -> int:
+        """Texels of a face of a level."""
+
+    def level_height(self, level: int) -> int:
+        """Texels of a face of a level."""
+
+    def level_offset(self, level: int) -> int:
+        """Index of the first value of a level."""
+
+def full_level_count(width: int, height: int) -> int:
+    """Number of levels down to 1x1."""
+
+def integrate(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], level: int = 0) -> list[float]:
+    """Sum of value times solid angle over the sphere, per channel."""
+
+def resample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], projection: str, width: int, height: int, filter: str, source_from_target: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+    """The finest level in another projection and size: a block of one level."""
 
 class CubePyramidLayout:
     """

@@ -10,9 +10,19 @@ direction of that point as seen from the map's origin:
 [[3.0, 0.0, 0.0]]
 """
 
+import contextlib
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from mirrorbake import _core
 from mirrorbake._core import (
     Proxy,
+    ProxyCandidate,
+    ProxyChoice,
     area_weighted_centroid,
+    choose_proxy,
     fit_box_mean_distance,
     fit_box_robust,
     fit_ellipsoid,
@@ -20,8 +30,47 @@ from mirrorbake._core import (
 
 __all__ = [
     "Proxy",
+    "ProxyCandidate",
+    "ProxyChoice",
     "area_weighted_centroid",
+    "choose_proxy",
     "fit_box_mean_distance",
     "fit_box_robust",
     "fit_ellipsoid",
+    "hull_triangles",
 ]
+
+
+def hull_triangles(
+    positions: NDArray[np.float32], triangles: NDArray[np.uint32], tolerance: float = 1e-4
+) -> NDArray[np.bool_]:
+    """Tell which triangles lie on the mesh's convex hull: they can never reflect the object itself.
+
+    Such polygons need the distant layer only, whatever the view ([PEM] section 4). A triangle counts as on
+    the hull if no vertex is in front of its plane by more than the tolerance.
+
+    Parameters
+    ----------
+    positions
+        (n, 3), metres.
+    triangles
+        (m, 3) indices, counter-clockwise seen from outside.
+    tolerance
+        Depth of dents that do not count, as a fraction of the bounding box's diagonal.
+
+    Returns
+    -------
+        (m,) booleans; False for triangles without area.
+
+    Raises
+    ------
+    InvalidArgument
+        Indices out of range, coordinates that are not finite, a negative tolerance.
+    """
+    extremes = positions
+    if len(positions) > 64 and np.all(np.isfinite(positions)):
+        # A plane that has any vertex in front has one of the hull's in front: test against those only. Flat
+        # meshes have no hull with a volume and are tested against all vertices.
+        with contextlib.suppress(QhullError):
+            extremes = positions[ConvexHull(positions).vertices]
+    return _core.hull_triangles(positions, triangles, extremes, tolerance).astype(np.bool_)

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
+from scipy.spatial import ConvexHull
 
 from mirrorbake.proxy import (
     Proxy,
     area_weighted_centroid,
+    choose_proxy,
     fit_box_mean_distance,
     fit_box_robust,
     fit_ellipsoid,
+    hull_triangles,
 )
 
 # Orthonormal in exact decimals.
@@ -155,3 +158,70 @@ def test_fit_boxes_find_the_room() -> None:
     assert robust.origin == room.origin
     mean = fit_box_mean_distance(hits, room.origin, -0.5)
     assert mean.centre[1] - mean.half_extent[1] == pytest.approx(-0.5, abs=1e-6)
+
+
+def test_mirror_lookups_follow_the_reflection_of_the_eyes_ray() -> None:
+    """Against r = 2(n·v)n − v in NumPy, float64, normals of any length; per pixel as well as per vertex."""
+    rng = np.random.default_rng(5)
+    proxy = Proxy.box((0, 0, 0), (2, 3, 4), origin=(0.5, 0, 0))
+    eye = (5.0, 6.0, 7.0)
+    p = rng.uniform(-1, 1, (6, 7, 3)).astype(np.float32)
+    n = rng.normal(size=(6, 7, 3)).astype(np.float32)
+    v = np.array(eye) - p
+    unit = n / np.linalg.norm(n.astype(np.float64), axis=-1, keepdims=True)
+    r = 2 * np.sum(unit * v, axis=-1, keepdims=True) * unit - v
+    expected = proxy.lookup_float64(p.astype(np.float64), r)
+    lookup = proxy.mirror_lookup(eye, p, n)
+    assert lookup.shape == (6, 7, 3)
+    assert angles(lookup, expected).max() < 2e-7
+    with pytest.raises(ValueError, match="normals"):
+        proxy.mirror_lookup(eye, p, n[:3])
+
+
+def test_hull_triangles_are_those_of_qhull() -> None:
+    """A bumpy star: facets that Qhull reports, and no others, have all vertices behind them."""
+    rng = np.random.default_rng(6)
+    d = rng.normal(size=(600, 3))
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    facets = ConvexHull(d).simplices  # triangulates the sphere
+    outward = np.einsum(
+        "ij,ij->i",
+        np.cross(d[facets[:, 1]] - d[facets[:, 0]], d[facets[:, 2]] - d[facets[:, 0]]),
+        d[facets].mean(axis=1),
+    )
+    facets[outward < 0] = facets[outward < 0][:, ::-1]
+    points = (d * rng.uniform(0.995, 1.0, (600, 1))).astype(np.float32)
+    triangles = facets.astype(np.uint32)
+    hull = {frozenset(simplex) for simplex in ConvexHull(points).simplices.tolist()}
+    expected = np.array([frozenset(t) in hull for t in triangles.tolist()])
+    assert 10 < expected.sum() < 500
+    np.testing.assert_array_equal(hull_triangles(points, triangles, tolerance=1e-7), expected)
+
+
+def test_hull_of_a_flat_mesh_needs_no_volume() -> None:
+    x, y = np.meshgrid(np.arange(10.0), np.arange(10.0))
+    points = np.stack([x.ravel(), np.zeros(100), y.ravel()], axis=1).astype(np.float32)
+    triangles = np.array([[0, 10, 1], [0, 1, 10], [0, 0, 1]], np.uint32)
+    np.testing.assert_array_equal(hull_triangles(points, triangles), [True, True, False])
+
+
+def test_choose_proxy_takes_the_room_and_says_why() -> None:
+    rng = np.random.default_rng(7)
+    room = Proxy.box((0.5, 1.0, -0.5), (3, 1.5, 2), origin=(0, 0, 0))
+    positions = rng.uniform(-0.2, 0.2, (1200, 3)).astype(np.float32)
+    directions = rng.normal(size=(1200, 3)).astype(np.float32)
+    hits = room.lookup(positions, directions)
+    distances = np.linalg.norm(hits - positions, axis=1)
+    views = (np.arange(1200) % 3).astype(np.int32)
+    choice = choose_proxy(positions, directions, distances, views, origin=(0, 0, 0))
+    assert choice.best.name == "box"
+    assert choice.reason.startswith("box: predicted off-view error")
+    assert choice.best.proxy.kind == "box"
+    np.testing.assert_allclose(choice.best.proxy.half_extent, (3, 1.5, 2), rtol=1e-4)
+    assert [c.parameters for c in choice.candidates] == [0, 4, 4, 6, 6, 9, 9]
+    assert choice.best.fit_error < 1e-5
+    assert choice.best.off_view_error < 1e-5
+    far = np.full(1200, np.inf, np.float32)
+    assert choose_proxy(positions, directions, far, views, origin=(0, 0, 0)).best.name == "infinite"
+    with pytest.raises(ValueError, match="at least 16"):
+        choose_proxy(positions[:3], directions[:3], far[:3], views[:3], origin=(0, 0, 0))

@@ -8,7 +8,9 @@
 #include "mirrorbake/core/version.hpp"
 #include "mirrorbake/envmap/cube_pyramid.hpp"
 #include "mirrorbake/envmap/cube_sampling.hpp"
+#include "mirrorbake/scene/shapes.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
+#include "mirrorbake/tracer/tracer.hpp"
 
 int main() {
   int failures = 0;
@@ -33,6 +35,15 @@ int main() {
   for (int i = 0; i < footprint.count; ++i)
     radiance += footprint.texels[i].weight * pyramid[footprint.texels[i].texel];
   expect("radiance of a uniform environment", radiance, 3.0, 1e-5);
+
+  // A ray from the middle of a box of two metres meets its wall after one.
+  mirrorbake::Scene scene;
+  scene.materials.emplace_back();
+  scene.objects.push_back({"room", mirrorbake::make_box(glm::vec3(-1.0F), glm::vec3(1.0F)), 0, {}});
+  const mirrorbake::Tracer tracer(scene);
+  const std::vector<glm::vec3> origin{glm::vec3(0.1F, 0.2F, 0.0F)};
+  const std::vector<glm::vec3> direction{glm::vec3(0.0F, 0.0F, -1.0F)};
+  expect("distance of a wall", tracer.intersect(origin, direction, {}).front().distance, 1.0, 1e-6);
 
   std::printf("mirrorbake %s\n", mirrorbake::version());
   return failures;

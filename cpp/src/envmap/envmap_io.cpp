@@ -1,0 +1,238 @@
+#include "mirrorbake/envmap/envmap_io.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <vector>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/envmap/ktx2.hpp"
+
+namespace mirrorbake {
+namespace {
+
+constexpr std::array<std::pair<FaceLayout, std::string_view>, 7> kNames = {{
+    {FaceLayout::automatic, "automatic"},
+    {FaceLayout::strip, "strip"},
+    {FaceLayout::column, "column"},
+    {FaceLayout::grid, "grid"},
+    {FaceLayout::cross, "cross"},
+    {FaceLayout::vertical_cross, "vertical_cross"},
+    {FaceLayout::files, "files"},
+}};
+
+// Where the faces are, in units of a face.
+struct Cell {
+  int column, row;
+};
+struct Arrangement {
+  int columns = 1;
+  int rows = 1;
+  std::vector<Cell> cells;
+  bool turns_last = false;
+};
+
+std::optional<Arrangement> arrangement(FaceLayout layout, int faces) {
+  Arrangement result;
+  const auto grid = [&](int columns) {
+    result.columns = columns;
+    result.rows = (faces + columns - 1) / columns;
+    for (int face = 0; face < faces; ++face) result.cells.push_back({face % columns, face / columns});
+  };
+  if (faces == 1) {
+    grid(1);
+    return result;
+  }
+  switch (layout) {
+    case FaceLayout::automatic:
+    case FaceLayout::strip: grid(faces); return result;
+    case FaceLayout::column: grid(1); return result;
+    case FaceLayout::grid:
+      if (faces != 6) return std::nullopt;
+      grid(3);
+      return result;
+    case FaceLayout::cross:
+      if (faces != 6) return std::nullopt;
+      return Arrangement{4, 3, {{2, 1}, {0, 1}, {1, 0}, {1, 2}, {1, 1}, {3, 1}}, false};
+    case FaceLayout::vertical_cross:
+      if (faces != 6) return std::nullopt;
+      return Arrangement{3, 4, {{2, 1}, {0, 1}, {1, 0}, {1, 2}, {1, 1}, {1, 3}}, true};
+    case FaceLayout::files: return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+// Calls body(pixel, texel) for indices of the image's pixel and the map's texel, in values.
+template <typename Body>
+void for_each_texel(const Arrangement& a, const Image& image, const EnvMapLayout& layout, int level,
+                    Body&& body) {
+  const int width = layout.level_width(level);
+  const int height = layout.level_height(level);
+  for (int face = 0; face < face_count(layout.projection); ++face) {
+    const Cell cell = a.cells[static_cast<std::size_t>(face)];
+    const bool turned = a.turns_last && face == 5;
+    for (int row = 0; row < height; ++row) {
+      for (int column = 0; column < width; ++column) {
+        const int x = cell.column * width + (turned ? width - 1 - column : column);
+        const int y = cell.row * height + (turned ? height - 1 - row : row);
+        body(image.offset(x, y), layout.index(level, face, row, column));
+      }
+    }
+  }
+}
+
+std::string face_path(const std::string& path, const Projection& projection, int face) {
+  static constexpr std::array<const char*, 6> kCube = {"px", "nx", "py", "ny", "pz", "nz"};
+  static constexpr std::array<const char*, 2> kParaboloid = {"front", "back"};
+  std::string result = path;
+  const std::size_t index = static_cast<std::size_t>(face);
+  return result.replace(result.find("{}"), 2,
+                        projection.kind == ProjectionKind::cube ? kCube[index] : kParaboloid[index]);
+}
+
+bool is_ktx2(const std::string& path) { return std::filesystem::path(path).extension() == ".ktx2"; }
+
+EnvMap load_faces(const std::string& path, const Projection& projection, const ImageLimits& limits) {
+  if (face_count(projection) == 1)
+    throw FileError(path, "names several images, but the projection has one face");
+  EnvMap map;
+  for (int face = 0; face < face_count(projection); ++face) {
+    const std::string name = face_path(path, projection, face);
+    Image image = load_image(name, limits);
+    const EnvMapLayout layout{projection, image.width, image.height, 1, image.channel_count()};
+    if (face == 0) {
+      if (image.width > 65536 / 6 && layout.size() > limits.max_bytes / sizeof(float))
+        throw FileError(name, "is too large");
+      try {
+        map = make_envmap(layout, image.channels);
+      } catch (const InvalidArgument& e) {
+        throw FileError(name, e.what());
+      }
+    } else if (layout != map.layout) {
+      throw FileError(name, "differs in size or channels from the first face");
+    }
+    std::copy(image.pixels.begin(), image.pixels.end(),
+              map.values.begin() + static_cast<std::ptrdiff_t>(layout.index(0, face, 0, 0)));
+  }
+  return map;
+}
+
+}  // namespace
+
+FaceLayout parse_face_layout(std::string_view name) {
+  for (const auto& [layout, known] : kNames) {
+    if (name == known) return layout;
+  }
+  throw InvalidArgument("layout", name, "automatic, strip, column, grid, cross, vertical_cross or files");
+}
+
+std::string_view to_string(FaceLayout layout) {
+  return std::find_if(kNames.begin(), kNames.end(), [&](const auto& n) { return n.first == layout; })->second;
+}
+
+Image pack_faces(const EnvMapView& map, int level, FaceLayout layout) {
+  validate(map);
+  const int faces = face_count(map.layout.projection);
+  const std::optional<Arrangement> a = arrangement(layout, faces);
+  if (!a) {
+    throw InvalidArgument("layout", to_string(layout),
+                          "one for the " + std::to_string(faces) + " faces of this map");
+  }
+  std::vector<std::string> names(map.channels.begin(), map.channels.end());
+  if (names.empty()) names = default_channels(map.layout.channels);
+  Image image(a->columns * map.layout.level_width(level), a->rows * map.layout.level_height(level), names);
+  for_each_texel(*a, image, map.layout, level, [&](std::size_t pixel, std::size_t texel) {
+    std::copy_n(map.values.begin() + static_cast<std::ptrdiff_t>(texel), names.size(),
+                image.pixels.begin() + static_cast<std::ptrdiff_t>(pixel));
+  });
+  return image;
+}
+
+EnvMap unpack_faces(const Image& image, const std::optional<Projection>& projection, FaceLayout layout) {
+  const std::string shape = std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels";
+  Projection found;
+  if (projection) {
+    found = *projection;
+  } else if (layout == FaceLayout::automatic && image.width == 2 * image.height) {
+    found.kind = ProjectionKind::latlong;
+  } else {
+    found.kind = ProjectionKind::cube;
+  }
+  const int faces = face_count(found);
+  const auto fits = [&](const Arrangement& a) {
+    const bool divides = image.width % a.columns == 0 && image.height % a.rows == 0;
+    const bool square = image.width / a.columns == image.height / a.rows;
+    return divides && (square || found.kind != ProjectionKind::cube);
+  };
+  std::optional<Arrangement> chosen;
+  if (layout != FaceLayout::automatic || faces == 1) {
+    chosen = arrangement(layout, faces);
+    if (chosen && !fits(*chosen)) chosen.reset();
+  } else {
+    for (const auto& [candidate, name] : kNames) {
+      if (candidate == FaceLayout::automatic || candidate == FaceLayout::files) continue;
+      const std::optional<Arrangement> a = arrangement(candidate, faces);
+      // Two faces side by side or above each other are told apart by being square.
+      if (a && fits(*a) && image.width * a->rows == image.height * a->columns) {
+        chosen = a;
+        break;
+      }
+    }
+  }
+  if (!chosen) {
+    throw InvalidArgument(
+        "image", shape,
+        projection ? "the faces of the projection " + to_string(found) + " in the layout " +
+                         std::string(to_string(layout))
+                   : "a panorama (2:1) or a cube (6:1, 1:6, 3:2, 4:3 or 3:4), or a named projection");
+  }
+  EnvMap map = make_envmap(
+      {found, image.width / chosen->columns, image.height / chosen->rows, 1, image.channel_count()},
+      image.channels);
+  for_each_texel(*chosen, image, map.layout, 0, [&](std::size_t pixel, std::size_t texel) {
+    std::copy_n(image.pixels.begin() + static_cast<std::ptrdiff_t>(pixel), image.channels.size(),
+                map.values.begin() + static_cast<std::ptrdiff_t>(texel));
+  });
+  return map;
+}
+
+EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection, FaceLayout layout,
+                   const ImageLimits& limits) {
+  if (is_ktx2(path)) return load_ktx2(path, limits);
+  if (path.find("{}") != std::string::npos) {
+    return load_faces(path, projection.value_or(Projection{ProjectionKind::cube}), limits);
+  }
+  const Image image = load_image(path, limits);
+  try {
+    return unpack_faces(image, projection, layout);
+  } catch (const InvalidArgument& e) {
+    throw FileError(path, e.what());
+  }
+}
+
+SaveReport save_envmap(const std::string& path, const EnvMapView& map, FaceLayout layout,
+                       PixelFormat format) {
+  if (is_ktx2(path)) return save_ktx2(path, map);
+  const bool several = path.find("{}") != std::string::npos;
+  if (!several && layout != FaceLayout::files) return save_image(path, pack_faces(map, 0, layout), format);
+  const Projection& projection = map.layout.projection;
+  if (!several || face_count(projection) == 1) {
+    throw InvalidArgument("path", path,
+                          several ? "no {}: the map has one face" : "a path with {} for the face");
+  }
+  validate(map);
+  std::vector<std::string> names(map.channels.begin(), map.channels.end());
+  if (names.empty()) names = default_channels(map.layout.channels);
+  SaveReport total;
+  const std::size_t face_values = map.level(0).size() / static_cast<std::size_t>(face_count(projection));
+  for (int face = 0; face < face_count(projection); ++face) {
+    const SaveReport report =
+        save_image(face_path(path, projection, face), map.layout.width, map.layout.height, names,
+                   map.level(0).subspan(static_cast<std::size_t>(face) * face_values, face_values), format);
+    total.clamped_to_half += report.clamped_to_half;
+    total.clipped += report.clipped;
+  }
+  return total;
+}
+
+}  // namespace mirrorbake

@@ -1,0 +1,252 @@
+#include "mirrorbake/envmap/ktx2.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/version.hpp"
+#include "mirrorbake/image/atomic_file.hpp"
+#include "mirrorbake/image/half.hpp"
+
+namespace mirrorbake {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "KTX2 is little-endian and so is this code");
+
+constexpr std::array<std::uint8_t, 12> kIdentifier = {0xab, 'K',  'T',  'X',  ' ',  '2',
+                                                      '0',  0xbb, '\r', '\n', 0x1a, '\n'};
+constexpr std::size_t kHeaderBytes = 80;
+constexpr std::size_t kLevelBytes = 24;
+
+// VkFormat numbers of the Vulkan specification, VK_FORMAT_R16_SFLOAT and so on.
+struct Format {
+  std::uint32_t vk_format;
+  int channels;
+  std::size_t bytes;  // of a channel
+};
+constexpr std::array<Format, 8> kFormats = {{
+    {76, 1, 2},
+    {83, 2, 2},
+    {90, 3, 2},
+    {97, 4, 2},
+    {100, 1, 4},
+    {103, 2, 4},
+    {106, 3, 4},
+    {109, 4, 4},
+}};
+
+class ByteWriter {
+ public:
+  template <typename T>
+  void put(T value) {
+    const auto raw = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
+    bytes.insert(bytes.end(), raw.begin(), raw.end());
+  }
+  void put_text(std::string_view text) {
+    for (const char c : text) bytes.push_back(static_cast<std::byte>(c));
+  }
+  void pad(std::size_t alignment) {
+    while (bytes.size() % alignment != 0) bytes.push_back(std::byte{0});
+  }
+  template <typename T>
+  void overwrite(std::size_t offset, T value) {
+    std::memcpy(bytes.data() + offset, &value, sizeof value);
+  }
+  std::vector<std::byte> bytes;
+};
+
+// Basic descriptor block of the Khronos Data Format Specification 1.3: linear BT.709 RGBA, signed floats.
+void put_data_format(ByteWriter& out, int channels) {
+  const std::uint32_t block = 24u + 16u * static_cast<std::uint32_t>(channels);
+  out.put<std::uint32_t>(block + 4u);
+  out.put<std::uint32_t>(0);  // vendor Khronos, basic type
+  out.put<std::uint16_t>(2);  // version 1.3
+  out.put<std::uint16_t>(static_cast<std::uint16_t>(block));
+  out.put<std::uint32_t>(0x00010101);                                // RGBSDA, BT.709, linear, straight alpha
+  out.put<std::uint32_t>(0);                                         // blocks of one texel
+  out.put<std::uint64_t>(static_cast<std::uint64_t>(2 * channels));  // bytes of plane 0
+  for (int c = 0; c < channels; ++c) {
+    out.put<std::uint16_t>(static_cast<std::uint16_t>(16 * c));
+    out.put<std::uint8_t>(15);                                                   // 16 bits
+    out.put<std::uint8_t>(static_cast<std::uint8_t>((c == 3 ? 15 : c) | 0xc0));  // channel; float and signed
+    out.put<std::uint32_t>(0);
+    out.put<float>(-1.0F);
+    out.put<float>(1.0F);
+  }
+}
+
+void put_key(ByteWriter& out, std::string_view key, std::string_view value) {
+  out.put<std::uint32_t>(static_cast<std::uint32_t>(key.size() + value.size() + 2));
+  out.put_text(key);
+  out.put<std::uint8_t>(0);
+  out.put_text(value);
+  out.put<std::uint8_t>(0);
+  out.pad(4);
+}
+
+class Reader {
+ public:
+  Reader(const std::string& path, const ImageLimits& limits)
+      : path_(path), in_(path, std::ios::binary | std::ios::ate) {
+    std::error_code error;
+    if (!std::filesystem::exists(path, error)) throw FileError(path, "does not exist");
+    if (!std::filesystem::is_regular_file(path, error) || !in_) throw FileError(path, "cannot be read");
+    size_ = static_cast<std::uint64_t>(in_.tellg());
+    if (size_ > limits.max_bytes) throw FileError(path, "is too large");
+  }
+
+  void require(std::uint64_t offset, std::uint64_t bytes) const {
+    if (offset > size_ || bytes > size_ - offset) throw FileError(path_, "is truncated");
+  }
+  void read(std::uint64_t offset, void* data, std::uint64_t bytes) {
+    require(offset, bytes);
+    in_.seekg(static_cast<std::streamoff>(offset));
+    in_.read(static_cast<char*>(data), static_cast<std::streamsize>(bytes));
+    if (!in_) throw FileError(path_, "cannot be read");
+  }
+  template <typename T>
+  T get(std::uint64_t offset) {
+    T value;
+    read(offset, &value, sizeof value);
+    return value;
+  }
+
+ private:
+  std::string path_;
+  std::ifstream in_;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace
+
+SaveReport save_ktx2(const std::string& path, const EnvMapView& map) {
+  validate(map);
+  const EnvMapLayout& layout = map.layout;
+  if (layout.projection.kind != ProjectionKind::cube) {
+    throw InvalidArgument("map", to_string(layout.projection), "a cube map: KTX2 stores no other projection");
+  }
+  if (layout.channels > 4)
+    throw InvalidArgument("channels", std::to_string(layout.channels), "1 to 4 in a KTX2 file");
+  const int stored = layout.channels == 3 ? 4 : layout.channels;
+  const Format& format = *std::find_if(kFormats.begin(), kFormats.end(),
+                                       [&](const Format& f) { return f.channels == stored && f.bytes == 2; });
+  ByteWriter out;
+  for (const std::uint8_t v : kIdentifier) out.put(v);
+  out.put(format.vk_format);
+  out.put<std::uint32_t>(2);  // bytes of the type
+  out.put(static_cast<std::uint32_t>(layout.width));
+  out.put(static_cast<std::uint32_t>(layout.height));
+  for (const std::uint32_t v : {0u, 0u, 6u}) out.put(v);  // no depth, no array, six faces
+  out.put(static_cast<std::uint32_t>(layout.levels));
+  out.put<std::uint32_t>(0);  // not supercompressed
+  const std::size_t index = out.bytes.size();
+  out.bytes.resize(kHeaderBytes + kLevelBytes * static_cast<std::size_t>(layout.levels));
+  const std::size_t data_format = out.bytes.size();
+  put_data_format(out, stored);
+  const std::size_t keys = out.bytes.size();
+  put_key(out, "KTXorientation", "rd");
+  put_key(out, "KTXwriter", std::string("mirrorbake ") + version());
+  out.overwrite(index, static_cast<std::uint32_t>(data_format));
+  out.overwrite(index + 4, static_cast<std::uint32_t>(keys - data_format));
+  out.overwrite(index + 8, static_cast<std::uint32_t>(keys));
+  out.overwrite(index + 12, static_cast<std::uint32_t>(out.bytes.size() - keys));
+
+  SaveReport report;
+  const std::size_t texel_bytes = 2 * static_cast<std::size_t>(stored);
+  // The coarsest level comes first in the file, so that a viewer can show something early.
+  for (int level = layout.levels - 1; level >= 0; --level) {
+    out.pad(std::lcm(texel_bytes, std::size_t{4}));
+    const std::size_t begin = out.bytes.size();
+    const std::span<const float> values = map.level(level);
+    out.bytes.reserve(begin + values.size() * 4);
+    for (std::size_t i = 0; i < values.size(); i += static_cast<std::size_t>(layout.channels)) {
+      for (std::size_t c = 0; c < static_cast<std::size_t>(stored); ++c) {
+        float v = c < static_cast<std::size_t>(layout.channels) ? values[i + c] : 1.0F;
+        if (std::abs(v) > 65504.0F) {
+          v = std::copysign(65504.0F, v);
+          ++report.clamped_to_half;
+        }
+        out.put(half_from_float(v));
+      }
+    }
+    const std::size_t entry = kHeaderBytes + kLevelBytes * static_cast<std::size_t>(level);
+    const std::uint64_t bytes = out.bytes.size() - begin;
+    out.overwrite(entry, static_cast<std::uint64_t>(begin));
+    out.overwrite(entry + 8, bytes);
+    out.overwrite(entry + 16, bytes);
+  }
+  write_file(path, out.bytes);
+  return report;
+}
+
+EnvMap load_ktx2(const std::string& path, const ImageLimits& limits) {
+  Reader in(path, limits);
+  std::array<std::uint8_t, 12> identifier{};
+  in.read(0, identifier.data(), identifier.size());
+  if (identifier != kIdentifier) throw FileError(path, "is not a KTX2 file");
+  const auto vk_format = in.get<std::uint32_t>(12);
+  const auto format = std::find_if(kFormats.begin(), kFormats.end(),
+                                   [&](const Format& f) { return f.vk_format == vk_format; });
+  if (format == kFormats.end()) {
+    throw FileError(path, "has the pixel format VkFormat " + std::to_string(vk_format) +
+                              ", expected float16 or float32 of one to four channels");
+  }
+  const auto width = in.get<std::uint32_t>(20);
+  const auto height = in.get<std::uint32_t>(24);
+  if (in.get<std::uint32_t>(28) > 1 || in.get<std::uint32_t>(32) > 1 || in.get<std::uint32_t>(36) != 6) {
+    throw FileError(path, "is not a single cube map");
+  }
+  const auto levels = std::max(in.get<std::uint32_t>(40), 1u);
+  if (in.get<std::uint32_t>(44) != 0) throw FileError(path, "is supercompressed, which is not supported");
+  const auto most = static_cast<std::uint32_t>(std::min(limits.max_side, 65536));
+  if (width < 1 || width > most || width != height) {
+    throw FileError(path, "has faces of " + std::to_string(width) + " x " + std::to_string(height) +
+                              " texels, expected square ones of 1 to " + std::to_string(most));
+  }
+  const int side = static_cast<int>(width);
+  if (levels > static_cast<std::uint32_t>(full_level_count(side, side))) {
+    throw FileError(path, "has " + std::to_string(levels) + " levels, more than its size allows");
+  }
+  const EnvMapLayout layout{{ProjectionKind::cube}, side, side, static_cast<int>(levels), format->channels};
+  if (layout.size() > limits.max_bytes / sizeof(float)) throw FileError(path, "is too large");
+
+  // Whether the file holds what its header promises is known before memory is taken for it.
+  for (std::uint32_t level = 0; level < levels; ++level) {
+    const std::uint64_t entry = kHeaderBytes + kLevelBytes * level;
+    const auto offset = in.get<std::uint64_t>(entry);
+    const auto bytes = in.get<std::uint64_t>(entry + 8);
+    const std::uint64_t expected = layout.level_texels(static_cast<int>(level)) *
+                                   static_cast<std::uint64_t>(format->channels) * format->bytes;
+    if (bytes != expected) throw FileError(path, "has a damaged index: level " + std::to_string(level));
+    in.require(offset, bytes);
+  }
+  EnvMap map = make_envmap(layout, default_channels(format->channels));
+  std::vector<std::uint16_t> halves;
+  for (std::uint32_t level = 0; level < levels; ++level) {
+    const auto offset = in.get<std::uint64_t>(kHeaderBytes + kLevelBytes * level);
+    const std::size_t first = layout.level_offset(static_cast<int>(level));
+    const std::size_t count = layout.level_offset(static_cast<int>(level) + 1) - first;
+    if (format->bytes == sizeof(float)) {
+      in.read(offset, map.values.data() + first, count * sizeof(float));
+      continue;
+    }
+    halves.resize(count);
+    in.read(offset, halves.data(), count * sizeof(std::uint16_t));
+    std::transform(halves.begin(), halves.end(), map.values.begin() + static_cast<std::ptrdiff_t>(first),
+                   float_from_half);
+  }
+  return map;
+}
+
+}  // namespace mirrorbake

@@ -1,0 +1,400 @@
+// mb-envmap: inspects, converts, filters, samples and compares environment maps.
+//
+// Exit status: 0 done, 2 usage, 3 input that cannot be read or makes no sense, 4 a computation without an answer.
+
+#include <CLI/CLI.hpp>
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/envmap/compare.hpp"
+#include "mirrorbake/envmap/conventions.hpp"
+#include "mirrorbake/envmap/envmap_io.hpp"
+#include "mirrorbake/envmap/mipmap.hpp"
+#include "mirrorbake/envmap/resample.hpp"
+#include "mirrorbake/envmap/sampling.hpp"
+
+namespace {
+
+using namespace mirrorbake;  // NOLINT(google-build-using-namespace): one program, one namespace
+
+std::string json_string(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    if (static_cast<unsigned char>(c) < 0x20) {
+      char code[8];
+      std::snprintf(code, sizeof code, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
+      result += code;
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
+// Shortest text that reads back as the same number; JSON has no infinity.
+template <typename T>
+std::string json_number(T value) {
+  if (!std::isfinite(static_cast<double>(value))) return "null";
+  char digits[64];
+  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
+}
+
+template <typename T>
+std::string json_list(const std::vector<T>& values) {
+  std::string result = "[";
+  for (std::size_t i = 0; i < values.size(); ++i) result += (i ? ", " : "") + json_number(values[i]);
+  return result + "]";
+}
+
+// What every command that reads a map takes.
+struct Input {
+  std::string path;
+  std::string projection;
+  std::string layout = "automatic";
+  std::string convention = "mirrorbake";
+
+  void add_options(CLI::App& app, const std::string& name = "input") {
+    app.add_option(name, path,
+                   "EXR, HDR, TIFF, PNG, JPEG or KTX2; {} in the name stands for px, nx, py, ny, pz, nz")
+        ->required();
+  }
+  void add_details(CLI::App& app) {
+    app.add_option(
+        "--from", projection,
+        "projection of the input: cube, latlong, dual_paraboloid, sphere_map, angular, fisheye:DEGREES "
+        "(default: by the shape of the image)");
+    app.add_option("--from-layout", layout,
+                   "how faces share the image: strip, column, grid, cross, vertical_cross")
+        ->capture_default_str();
+    app.add_option("--from-convention", convention,
+                   "orientation of the input: mirrorbake, openexr, oiio, mitsuba, threejs, ktx2")
+        ->capture_default_str();
+  }
+  EnvMap load() const {
+    std::optional<Projection> given;
+    if (!projection.empty()) given = parse_projection(projection);
+    EnvMap map = load_envmap(path, given, parse_face_layout(layout));
+    return convention == "mirrorbake" ? map
+                                      : convert_convention(map, convention, ConventionWay::from_foreign);
+  }
+};
+
+struct Output {
+  std::string path;
+  std::string layout = "automatic";
+  std::string format = "automatic";
+
+  void add_options(CLI::App& app) {
+    app.add_option("-o,--output", path, "file to write; the extension decides the format")->required();
+    app.add_option("--layout", layout,
+                   "how faces share the image: strip, column, grid, cross, vertical_cross, files")
+        ->capture_default_str();
+    app.add_option("--format", format, "pixels in the file: automatic, half, float32, uint8, uint16")
+        ->capture_default_str();
+  }
+  void save(const EnvMapView& map, bool json) const {
+    const SaveReport report = save_envmap(path, map, parse_face_layout(layout), parse_pixel_format(format));
+    if (report.clamped_to_half + report.clipped > 0) {
+      std::cerr << "mb-envmap: warning: " << path << ": " << report.clamped_to_half
+                << " values beyond 65504 clamped to float16, " << report.clipped
+                << " outside of the format clipped\n";
+    }
+    if (!json) return;
+    std::cout << "{\"output\": " << json_string(path)
+              << ", \"projection\": " << json_string(to_string(map.layout.projection))
+              << ", \"width\": " << map.layout.width << ", \"height\": " << map.layout.height
+              << ", \"levels\": " << map.layout.levels << ", \"clamped_to_half\": " << report.clamped_to_half
+              << ", \"clipped\": " << report.clipped << "}\n";
+  }
+};
+
+void print_info(const Input& input, bool json) {
+  const EnvMap map = input.load();
+  std::vector<float> low(static_cast<std::size_t>(map.layout.channels),
+                         std::numeric_limits<float>::infinity());
+  std::vector<float> high(low.size(), -std::numeric_limits<float>::infinity());
+  const std::span<const float> values = EnvMapView(map).level(0);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t c = i % low.size();
+    low[c] = std::min(low[c], values[i]);
+    high[c] = std::max(high[c], values[i]);
+  }
+  std::vector<double> mean = integrate(map);
+  const std::vector<double> angles =
+      texel_solid_angles(map.layout.projection, map.layout.width, map.layout.height);
+  double whole = 0.0;
+  for (const double angle : angles) whole += angle;
+  for (double& m : mean) m /= whole * face_count(map.layout.projection);
+  const std::size_t bad = count_not_finite(map);
+  if (json) {
+    std::string names = "[";
+    for (std::size_t c = 0; c < map.channels.size(); ++c)
+      names += (c ? ", " : "") + json_string(map.channels[c]);
+    std::cout << "{\"path\": " << json_string(input.path)
+              << ", \"projection\": " << json_string(to_string(map.layout.projection))
+              << ", \"width\": " << map.layout.width << ", \"height\": " << map.layout.height
+              << ", \"faces\": " << face_count(map.layout.projection) << ", \"levels\": " << map.layout.levels
+              << ", \"channels\": " << names << "], \"min\": " << json_list(low)
+              << ", \"max\": " << json_list(high) << ", \"mean_radiance\": " << json_list(mean)
+              << ", \"not_finite\": " << bad << "}\n";
+    return;
+  }
+  std::cout << input.path << ": " << to_string(map.layout.projection) << ", "
+            << face_count(map.layout.projection) << " face(s) of " << map.layout.width << " x "
+            << map.layout.height << ", " << map.layout.levels << " level(s), " << map.layout.channels
+            << " channel(s)\n";
+  for (std::size_t c = 0; c < low.size(); ++c) {
+    std::cout << "  " << (c < map.channels.size() ? map.channels[c] : std::to_string(c)) << ": " << low[c]
+              << " to " << high[c] << ", mean radiance over the sphere " << mean[c] << '\n';
+  }
+  if (bad > 0) std::cout << "  " << bad << " values are NaN or infinite\n";
+}
+
+struct Size {
+  int width = 0;
+  int height = 0;
+};
+
+// "256" or "512x256".
+Size parse_size(const std::string& text, const Projection& projection) {
+  Size size;
+  const char* end = text.data() + text.size();
+  auto [rest, error] = std::from_chars(text.data(), end, size.width);
+  if (error == std::errc() && rest == end) {
+    size.height = size.width;
+    if (natural_aspect(projection) == 2) size.width *= 2;
+    return size;
+  }
+  if (error == std::errc() && *rest == 'x') {
+    const auto second = std::from_chars(rest + 1, end, size.height);
+    if (second.ec == std::errc() && second.ptr == end) return size;
+  }
+  throw InvalidArgument("--size", text, "HEIGHT or WIDTHxHEIGHT in texels of a face");
+}
+
+struct Convert {
+  Input input;
+  Output output;
+  std::string projection;
+  std::string size;
+  std::string filter = "automatic";
+  std::string convention = "mirrorbake";
+  float turn = 0.0F;
+
+  void run(bool json) const {
+    const EnvMap source = input.load();
+    const Projection target = parse_projection(projection);
+    // About as many texels as the source has.
+    const double texels = static_cast<double>(source.layout.level_texels(0)) / face_count(target);
+    const int natural =
+        std::max(1, static_cast<int>(std::lround(std::sqrt(texels / natural_aspect(target)))));
+    const Size wanted =
+        size.empty() ? Size{natural * natural_aspect(target), natural} : parse_size(size, target);
+    const float angle = turn * std::numbers::pi_v<float> / 180.0F;
+    const float c = std::cos(angle);
+    const float s = std::sin(angle);
+    ResampleOptions options{parse_resample_filter(filter)};
+    options.source_from_target = glm::mat3(glm::vec3(c, 0, s), glm::vec3(0, 1, 0), glm::vec3(-s, 0, c));
+    const bool same = target == source.layout.projection && wanted.width == source.layout.width &&
+                      wanted.height == source.layout.height && turn == 0.0F;
+    EnvMap result = same ? source : resample(source, target, wanted.width, wanted.height, options);
+    if (convention != "mirrorbake")
+      result = convert_convention(result, convention, ConventionWay::to_foreign);
+    output.save(result, json);
+  }
+};
+
+void print_comparison(const Comparison& c, bool json) {
+  if (json) {
+    std::cout << "{\"max_error\": " << json_number(c.max_error)
+              << ", \"mean_error\": " << json_number(c.mean_error)
+              << ", \"rms_error\": " << json_number(c.rms_error)
+              << ", \"relative_l2\": " << json_number(c.relative_l2) << ", \"psnr\": " << json_number(c.psnr)
+              << ", \"flux_ratio\": " << json_number(c.flux_ratio) << ", \"not_finite\": " << c.not_finite
+              << "}\n";
+    return;
+  }
+  std::cout << "max error    " << c.max_error << "\nmean error   " << c.mean_error << "\nRMS error    "
+            << c.rms_error << "\nrelative L2  " << c.relative_l2 << "\nPSNR         " << c.psnr
+            << " dB\nflux ratio   " << c.flux_ratio << "\nnot finite   " << c.not_finite << '\n';
+}
+
+// Levels as KTX2, or as one image per level: {} in the path is the level's number then.
+void write_mips(const EnvMap& mips, const Output& output, bool json) {
+  if (std::filesystem::path(output.path).extension() == ".ktx2") {
+    output.save(mips, json);
+    return;
+  }
+  const std::size_t mark = output.path.find("{}");
+  if (mark == std::string::npos) {
+    throw InvalidArgument("--output", output.path,
+                          "a .ktx2 file, or an image path with {} for the number of the level");
+  }
+  for (int level = 0; level < mips.layout.levels; ++level) {
+    EnvMapLayout layout = mips.layout;
+    layout.width = mips.layout.level_width(level);
+    layout.height = mips.layout.level_height(level);
+    layout.levels = 1;
+    Output one = output;
+    one.path.replace(mark, 2, std::to_string(level));
+    one.save(EnvMapView{layout, EnvMapView(mips).level(level), mips.channels}, json);
+  }
+}
+
+void write_border(const EnvMap& map, int border, const Output& output) {
+  const std::vector<float> wide = add_border(map, 0, border);
+  // The widened faces are no environment map any more; they are packed like one, one below the other.
+  std::vector<std::string> names = map.channels;
+  if (names.empty()) names = default_channels(map.layout.channels);
+  const int width = map.layout.width + 2 * border;
+  const int height = (map.layout.height + 2 * border) * face_count(map.layout.projection);
+  save_image(output.path, width, height, names, wide, parse_pixel_format(output.format));
+}
+
+void print_samples(const EnvMap& map, const std::vector<std::vector<float>>& directions,
+                   const std::string& filter, bool json) {
+  std::vector<glm::vec3> d;
+  for (const std::vector<float>& v : directions) d.emplace_back(v[0], v[1], v[2]);
+  const std::vector<glm::vec3> none(d.size(), glm::vec3(0.0F));
+  const std::size_t channels = static_cast<std::size_t>(map.layout.channels);
+  std::vector<float> values(d.size() * channels);
+  if (sample(map, d, none, none, {parse_sample_filter(filter)}, values) > 0) {
+    throw InvalidArgument("--direction", "NaN, infinite or zero", "a finite vector of a length above 0");
+  }
+  for (std::size_t i = 0; i < d.size(); ++i) {
+    const std::vector<float> texel(values.begin() + static_cast<std::ptrdiff_t>(i * channels),
+                                   values.begin() + static_cast<std::ptrdiff_t>((i + 1) * channels));
+    if (json) {
+      std::cout << "{\"direction\": " << json_list(directions[i]) << ", \"value\": " << json_list(texel)
+                << "}\n";
+    } else {
+      for (std::size_t c = 0; c < channels; ++c) std::cout << (c ? " " : "") << json_number(texel[c]);
+      std::cout << '\n';
+    }
+  }
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Inspects, converts, filters, samples and compares environment maps.", "mb-envmap");
+  app.set_version_flag("--version", "mb-envmap " MIRRORBAKE_VERSION);
+  app.require_subcommand(1);
+  app.fallthrough();
+  int threads = 0;
+  bool json = false;
+  app.add_option("--threads", threads, "threads to use, 0 for all")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_flag("--json", json, "print figures as JSON, one object per line");
+
+  Input info;
+  CLI::App* info_command = app.add_subcommand("info", "Projection, size, range and mean radiance of a map");
+  info.add_options(*info_command);
+  info.add_details(*info_command);
+
+  Convert convert;
+  CLI::App* convert_command =
+      app.add_subcommand("convert", "Another projection, size, layout, orientation or format");
+  convert.input.add_options(*convert_command);
+  convert.input.add_details(*convert_command);
+  convert.output.add_options(*convert_command);
+  convert_command->add_option("--to", convert.projection, "projection to make, as for --from")->required();
+  convert_command->add_option(
+      "--size", convert.size,
+      "texels of a face, HEIGHT or WIDTHxHEIGHT (default: as many texels as the input has)");
+  convert_command->add_option("--filter", convert.filter, "automatic, area, bilinear or nearest")
+      ->capture_default_str();
+  convert_command
+      ->add_option("--to-convention", convert.convention, "orientation to make, as for --from-convention")
+      ->capture_default_str();
+  convert_command
+      ->add_option("--turn", convert.turn, "degrees to turn the surroundings about +Y, from -Z towards +X")
+      ->capture_default_str();
+
+  Input mips_input;
+  Output mips_output;
+  std::string mip_filter = "seamless";
+  CLI::App* mips_command =
+      app.add_subcommand("mips", "All levels of a map, as KTX2 or as one image per level");
+  mips_input.add_options(*mips_command);
+  mips_input.add_details(*mips_command);
+  mips_output.add_options(*mips_command);
+  mips_command->add_option("--filter", mip_filter, "box, solid_angle or seamless")->capture_default_str();
+
+  Input border_input;
+  Output border_output;
+  int border = 1;
+  CLI::App* border_command =
+      app.add_subcommand("border", "Faces widened by texels of their neighbours, one below the other");
+  border_input.add_options(*border_command);
+  border_input.add_details(*border_command);
+  border_output.add_options(*border_command);
+  border_command->add_option("--width", border, "texels to add on every side")->capture_default_str();
+
+  Input sample_input;
+  std::vector<std::vector<float>> directions;
+  std::string sample_filter = "bilinear";
+  CLI::App* sample_command = app.add_subcommand("sample", "Values of a map in given directions");
+  sample_input.add_options(*sample_command);
+  sample_input.add_details(*sample_command);
+  sample_command->add_option("--direction", directions, "x y z, may be given several times")
+      ->required()
+      ->type_size(3);
+  sample_command->add_option("--filter", sample_filter, "nearest or bilinear")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"nearest", "bilinear"}));
+
+  Input first;
+  Input second;
+  CLI::App* compare_command = app.add_subcommand("compare", "Errors of a map against a reference");
+  first.add_options(*compare_command, "input");
+  second.add_options(*compare_command, "reference");
+  first.add_details(*compare_command);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const ThreadLimit limit(threads);
+  if (*info_command) print_info(info, json);
+  if (*convert_command) convert.run(json);
+  if (*mips_command)
+    write_mips(build_mips(mips_input.load(), parse_mip_filter(mip_filter)), mips_output, json);
+  if (*border_command) write_border(border_input.load(), border, border_output);
+  if (*sample_command) print_samples(sample_input.load(), directions, sample_filter, json);
+  if (*compare_command) {
+    second.projection = first.projection;
+    second.layout = first.layout;
+    second.convention = first.convention;
+    print_comparison(compare(first.load(), second.load()), json);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const NumericalError& error) {
+    std::cerr << "mb-envmap: " << error.what() << '\n';
+    return 4;
+  } catch (const std::exception& error) {
+    std::cerr << "mb-envmap: " << error.what() << '\n';
+    return 3;
+  }
+}

@@ -25,20 +25,28 @@ using EmbreeDevice = std::unique_ptr<std::remove_pointer_t<RTCDevice>, EmbreeRel
 using EmbreeScene = std::unique_ptr<std::remove_pointer_t<RTCScene>, EmbreeRelease<rtcReleaseScene>>;
 using EmbreeGeometry = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, EmbreeRelease<rtcReleaseGeometry>>;
 
-/// Whether successive rays of a thread resemble each other, which lets Embree share work.
-enum class Coherence { coherent, incoherent };
-
-inline void intersect1(RTCScene scene, RTCRayHit& ray, Coherence coherence) {
+inline void intersect1(RTCScene scene, RTCRayHit& ray) {
 #if MIRRORBAKE_EMBREE_MAJOR >= 4
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  if (coherence == Coherence::coherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
-  rtcIntersect1(scene, &ray, &arguments);
+  rtcIntersect1(scene, &ray, nullptr);
 #else
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  if (coherence == Coherence::coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   rtcIntersect1(scene, &context, &ray);
+#endif
+}
+
+/// Sixteen coherent rays, of which those with `valid` = −1 are traced.
+inline void intersect16(const int* valid, RTCScene scene, RTCRayHit16& rays) {
+#if MIRRORBAKE_EMBREE_MAJOR >= 4
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect16(valid, scene, &rays, &arguments);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect16(valid, scene, &context, &rays);
 #endif
 }
 

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 #include <glm/common.hpp>
@@ -11,41 +13,36 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "options.hpp"
+#include "primary_rays.hpp"
 #include "state.hpp"
 
 namespace mirrorbake {
 namespace {
 
 using tracing::CameraRays;
-using tracing::Coherence;
 using tracing::Hit;
 using tracing::PathLimits;
+using tracing::PrimaryRow;
+using tracing::PrimarySample;
 using tracing::Ray;
 using tracing::RayScene;
 using tracing::SampleStream;
 using tracing::Surface;
 using tracing::World;
 
-/// Applies `visit` to the same array of two SurfaceSamples, one array after the other.
-template <typename Visit>
-void for_each_array(SurfaceSamples& a, SurfaceSamples& b, const Visit& visit) {
-  visit(a.pixel, b.pixel);
-  visit(a.part, b.part);
-  visit(a.triangle, b.triangle);
-  visit(a.barycentric, b.barycentric);
-  visit(a.position, b.position);
-  visit(a.normal, b.normal);
-  visit(a.reflection, b.reflection);
-  visit(a.dposition_dx, b.dposition_dx);
-  visit(a.dposition_dy, b.dposition_dy);
-  visit(a.dreflection_dx, b.dreflection_dx);
-  visit(a.dreflection_dy, b.dreflection_dy);
-  visit(a.fresnel, b.fresnel);
-  visit(a.albedo, b.albedo);
-  visit(a.diffuse, b.diffuse);
-  visit(a.local, b.local);
-  visit(a.distant, b.distant);
-  visit(a.hit_distance, b.hit_distance);
+/// Calls `task(member)` for every array of SurfaceSamples, in parallel.
+template <typename Task>
+void for_each_array(const Task& task) {
+  using S = SurfaceSamples;
+  const auto call = [&](auto... members) {
+    const std::array<std::function<void()>, sizeof...(members)> calls{[&task, members] { task(members); }...};
+    parallel_for(calls.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) calls[i]();
+    });
+  };
+  call(&S::pixel, &S::part, &S::triangle, &S::barycentric, &S::position, &S::normal, &S::reflection,
+       &S::dposition_dx, &S::dposition_dy, &S::dreflection_dx, &S::dreflection_dy, &S::fresnel, &S::albedo,
+       &S::diffuse, &S::local, &S::distant, &S::hit_distance);
 }
 
 /// One image row: its samples in order, and the beauty value of each where light is traced.
@@ -60,12 +57,17 @@ SurfaceSamples concatenate(std::vector<Row>& rows, const Camera& camera, const T
   all.width = camera.width;
   all.height = camera.height;
   all.samples_per_pixel = options.samples_per_pixel;
-  for (Row& row : rows) {
-    for_each_array(all, row.samples, [](auto& whole, auto& part) {
+  for_each_array([&](auto member) {
+    auto& whole = all.*member;
+    std::size_t size = 0;
+    for (const Row& row : rows) size += (row.samples.*member).size();
+    whole.reserve(size);
+    for (Row& row : rows) {
+      auto& part = row.samples.*member;
       whole.insert(whole.end(), part.begin(), part.end());
       part = {};
-    });
-  }
+    }
+  });
   return all;
 }
 
@@ -245,19 +247,22 @@ void check_arguments(const World& world, const Camera& camera, int reflector, co
   check_eye_outside(world, camera, reflector);
 }
 
-/// Calls `sample(ray, hit, stream, point)` for every sample of a pixel, in order; `point` is its place in the
-/// image.
-template <typename Sample>
-void for_each_sample(const World& world, const Camera& camera, const CameraRays& rays,
-                     const TraceOptions& options, int x, int y, const Sample& sample) {
+/// The samples of image row `y`.
+auto primary_row(const World& world, const Camera& camera, const CameraRays& rays,
+                 const TraceOptions& options, std::size_t y) {
   const glm::vec3 eye = camera.eye - world.rays.origin();
-  for (int i = 0; i < options.samples_per_pixel; ++i) {
-    const SampleStream stream = tracing::pixel_stream(camera, options, x, y, i);
-    const glm::vec2 point = glm::vec2(x, y) + stream.get(tracing::camera_dimension);
-    const Ray ray{eye, rays.direction(point)};
-    sample(ray, world.rays.all().intersect(ray, Coherence::coherent), stream, point);
-  }
+  return PrimaryRow(world.rays.all(), options.seed, camera.width, options.samples_per_pixel,
+                    static_cast<int>(y), [eye, &rays](glm::vec2 point) {
+                      return Ray{eye, rays.direction(point)};
+                    });
 }
+
+std::uint32_t pixel_number(const Camera& camera, std::size_t y, int x) {
+  return static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera.width) +
+         static_cast<std::uint32_t>(x);
+}
+
+bool meets(const Hit& hit, int object) { return !hit.missed() && static_cast<int>(hit.geometry) == object; }
 
 }  // namespace
 
@@ -274,30 +279,29 @@ LayerTrace Tracer::trace_layers(const Camera& camera, int reflector, const Trace
   parallel_for(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
       SurfaceSamples& out = rows[y].samples;
+      auto primary = primary_row(world, camera, rays, options, y);
       for (int x = 0; x < camera.width; ++x) {
-        const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera.width) +
-                           static_cast<std::uint32_t>(x);
         glm::dvec3 beauty(0.0);
         PixelLayers mean;
-        for_each_sample(world, camera, rays, options, x, static_cast<int>(y),
-                        [&](const Ray& ray, const Hit& hit, const SampleStream& stream, glm::vec2 point) {
-                          const glm::vec3 value = tracing::radiance(world, ray, hit, limits, stream, 0);
-                          beauty += glm::dvec3(value);
-                          if (hit.missed() || static_cast<int>(hit.geometry) != reflector) return;
-                          const Surface surface =
-                              tracing::surface_at(world.scene, world.rays, hit, ray.direction);
-                          const glm::vec3 body = tracing::body_radiance(world, surface, limits, stream, 0);
-                          const SpecularLayers specular =
-                              trace_specular(world, without_reflector, surface, limits, stream);
-                          record_surface(out, world, surface, hit.distance,
-                                         rays.direction_with_differentials(point), pixel);
-                          out.diffuse.push_back(body);
-                          out.local.push_back(specular.local);
-                          out.distant.push_back(specular.distant);
-                          out.hit_distance.push_back(specular.hit_distance);
-                          rows[y].beauty.push_back(value);
-                          mean.add(surface, body, specular, out.position.back(), out.part.back());
-                        });
+        for (int i = 0; i < options.samples_per_pixel; ++i) {
+          const PrimarySample& sample = primary.next();
+          const glm::vec3 value = tracing::radiance(world, sample.ray, sample.hit, limits, sample.stream, 0);
+          beauty += glm::dvec3(value);
+          if (!meets(sample.hit, reflector)) continue;
+          const Surface surface =
+              tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
+          const glm::vec3 body = tracing::body_radiance(world, surface, limits, sample.stream, 0);
+          const SpecularLayers specular =
+              trace_specular(world, without_reflector, surface, limits, sample.stream);
+          record_surface(out, world, surface, sample.hit.distance,
+                         rays.direction_with_differentials(sample.point), pixel_number(camera, y, x));
+          out.diffuse.push_back(body);
+          out.local.push_back(specular.local);
+          out.distant.push_back(specular.distant);
+          out.hit_distance.push_back(specular.hit_distance);
+          rows[y].beauty.push_back(value);
+          mean.add(surface, body, specular, out.position.back(), out.part.back());
+        }
         float* channels = trace.layers.at(x, static_cast<int>(y));
         for (int c = 0; c < 3; ++c) channels[c] = static_cast<float>(beauty[c] / options.samples_per_pixel);
         mean.write(channels + 3, options.samples_per_pixel);
@@ -306,8 +310,9 @@ LayerTrace Tracer::trace_layers(const Camera& camera, int reflector, const Trace
   });
   trace.samples = concatenate(rows, camera, options);
   trace.sample_beauty.reserve(trace.samples.size());
-  for (const Row& row : rows)
+  for (const Row& row : rows) {
     trace.sample_beauty.insert(trace.sample_beauty.end(), row.beauty.begin(), row.beauty.end());
+  }
   return trace;
 }
 
@@ -319,17 +324,16 @@ SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
   std::vector<Row> rows(static_cast<std::size_t>(camera.height));
   parallel_for(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
+      auto primary = primary_row(world, camera, rays, options, y);
       for (int x = 0; x < camera.width; ++x) {
-        const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera.width) +
-                           static_cast<std::uint32_t>(x);
-        for_each_sample(world, camera, rays, options, x, static_cast<int>(y),
-                        [&](const Ray& ray, const Hit& hit, const SampleStream&, glm::vec2 point) {
-                          if (hit.missed() || static_cast<int>(hit.geometry) != reflector) return;
-                          const Surface surface =
-                              tracing::surface_at(world.scene, world.rays, hit, ray.direction);
-                          record_surface(rows[y].samples, world, surface, hit.distance,
-                                         rays.direction_with_differentials(point), pixel);
-                        });
+        for (int i = 0; i < options.samples_per_pixel; ++i) {
+          const PrimarySample& sample = primary.next();
+          if (!meets(sample.hit, reflector)) continue;
+          const Surface surface =
+              tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
+          record_surface(rows[y].samples, world, surface, sample.hit.distance,
+                         rays.direction_with_differentials(sample.point), pixel_number(camera, y, x));
+        }
       }
     }
   });

@@ -147,17 +147,46 @@ RayScene::View RayScene::without(std::span<const int> hidden) const {
   return view;
 }
 
-Hit RayScene::View::intersect(const Ray& ray, Coherence coherence) const {
+Hit RayScene::View::intersect(const Ray& ray) const {
   RTCRayHit query;
   query.ray = to_embree(ray, mask_);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  intersect1(scene_, query, coherence);
+  intersect1(scene_, query);
   Hit hit;
   if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
     hit = {query.ray.tfar, query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v};
   }
   return hit;
+}
+
+void RayScene::View::intersect_packet(std::span<const Ray> rays, Hit* hits) const {
+  alignas(64) RTCRayHit16 query;
+  alignas(64) int valid[kPacketSize];
+  for (std::size_t i = 0; i < kPacketSize; ++i) {
+    valid[i] = i < rays.size() ? -1 : 0;
+    const Ray& ray = rays[std::min(i, rays.size() - 1)];
+    query.ray.org_x[i] = ray.origin.x;
+    query.ray.org_y[i] = ray.origin.y;
+    query.ray.org_z[i] = ray.origin.z;
+    query.ray.tnear[i] = 0.0F;
+    query.ray.dir_x[i] = ray.direction.x;
+    query.ray.dir_y[i] = ray.direction.y;
+    query.ray.dir_z[i] = ray.direction.z;
+    query.ray.time[i] = 0.0F;
+    query.ray.tfar[i] = ray.max_distance;
+    query.ray.mask[i] = mask_;
+    query.ray.id[i] = 0;
+    query.ray.flags[i] = 0;
+    query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  intersect16(valid, scene_, query);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    hits[i] = {};
+    if (query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+    hits[i] = {query.ray.tfar[i], query.hit.geomID[i], query.hit.primID[i], query.hit.u[i], query.hit.v[i]};
+  }
 }
 
 bool RayScene::View::occluded(const Ray& ray) const {

@@ -18,6 +18,7 @@ struct Ray {
   float max_distance = std::numeric_limits<float>::infinity();
 };
 
+inline constexpr std::size_t kPacketSize = 16;
 inline constexpr std::uint32_t kNoGeometry = RTC_INVALID_GEOMETRY_ID;
 
 struct Hit {
@@ -41,7 +42,9 @@ class RayScene {
   class View {
    public:
     /// Closest hit. The ray must be finite and its direction a unit vector.
-    Hit intersect(const Ray& ray, Coherence coherence = Coherence::incoherent) const;
+    Hit intersect(const Ray& ray) const;
+    /// Closest hits of up to kPacketSize rays that resemble each other: several times faster than one by one.
+    void intersect_packet(std::span<const Ray> rays, Hit* hits) const;
     bool occluded(const Ray& ray) const;
 
    private:

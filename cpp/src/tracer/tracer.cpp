@@ -14,15 +14,14 @@
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/projection/cube.hpp"
 #include "options.hpp"
+#include "primary_rays.hpp"
 #include "state.hpp"
 
 namespace mirrorbake {
 namespace {
 
-using tracing::Coherence;
 using tracing::Hit;
 using tracing::Ray;
-using tracing::SampleStream;
 
 // Embree's own limit is 1.8e18.
 constexpr float kLargestCoordinate = 1e18F;
@@ -45,6 +44,30 @@ const TracerOptions& validated(const TracerOptions& options) {
   tracing::check_range("cache_rays", options.cache_rays, 1, 65536);
   tracing::check_range("cache_bounces", options.cache_bounces, 1, 16);
   return options;
+}
+
+/// Beauty values along `ray_through(row, point)`, the rays passing through what `view` leaves out.
+template <typename RayThrough>
+Image trace_image(const tracing::World& world, const tracing::RayScene::View& view, int width, int height,
+                  const TraceOptions& options, const RayThrough& ray_through) {
+  const tracing::PathLimits limits{options.max_specular_depth, options.max_diffuse_depth};
+  Image image(width, height, {"R", "G", "B"});
+  parallel_for(static_cast<std::size_t>(height), 1, [&](std::size_t begin, std::size_t end) {
+    for (auto y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+      tracing::PrimaryRow row(view, options.seed, width, options.samples_per_pixel, y,
+                              [&](glm::vec2 point) { return ray_through(y, point); });
+      for (int x = 0; x < width; ++x) {
+        glm::dvec3 sum(0.0);
+        for (int i = 0; i < options.samples_per_pixel; ++i) {
+          const tracing::PrimarySample& s = row.next();
+          sum += glm::dvec3(tracing::radiance(world, s.ray, s.hit, limits, s.stream, 0));
+        }
+        const glm::vec3 mean(sum / static_cast<double>(options.samples_per_pixel));
+        std::copy_n(&mean.x, 3, image.at(x, y));
+      }
+    }
+  });
+  return image;
 }
 
 }  // namespace
@@ -92,25 +115,9 @@ Image Tracer::trace_beauty(const Camera& camera, const TraceOptions& options) co
   tracing::validate(options);
   const tracing::World& world = state_->world;
   const tracing::CameraRays rays(camera);
-  const tracing::PathLimits limits{options.max_specular_depth, options.max_diffuse_depth};
   const glm::vec3 eye = camera.eye - world.rays.origin();
-  Image image(camera.width, camera.height, {"R", "G", "B"});
-  parallel_for(static_cast<std::size_t>(camera.height), 1, [&](std::size_t begin, std::size_t end) {
-    for (auto y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
-      for (int x = 0; x < camera.width; ++x) {
-        glm::dvec3 sum(0.0);
-        for (int s = 0; s < options.samples_per_pixel; ++s) {
-          const SampleStream stream = tracing::pixel_stream(camera, options, x, y, s);
-          const Ray ray{eye, rays.direction(glm::vec2(x, y) + stream.get(tracing::camera_dimension))};
-          const Hit hit = world.rays.all().intersect(ray, Coherence::coherent);
-          sum += glm::dvec3(tracing::radiance(world, ray, hit, limits, stream, 0));
-        }
-        const glm::vec3 mean(sum / static_cast<double>(options.samples_per_pixel));
-        std::copy_n(&mean.x, 3, image.at(x, y));
-      }
-    }
-  });
-  return image;
+  const auto ray_through = [&](int, glm::vec2 point) { return Ray{eye, rays.direction(point)}; };
+  return trace_image(world, world.rays.all(), camera.width, camera.height, options, ray_through);
 }
 
 Image Tracer::capture_cube(glm::vec3 origin, int size, std::span<const int> hidden,
@@ -120,31 +127,14 @@ Image Tracer::capture_cube(glm::vec3 origin, int size, std::span<const int> hidd
   if (!usable(origin)) throw InvalidArgument("origin", text(origin), "finite coordinates up to 1e18");
   const tracing::World& world = state_->world;
   const tracing::RayScene::View view = world.rays.without(hidden);
-  const tracing::PathLimits limits{options.max_specular_depth, options.max_diffuse_depth};
-  Image image(size, 6 * size, {"R", "G", "B"});
-  parallel_for(static_cast<std::size_t>(6 * size), 1, [&](std::size_t begin, std::size_t end) {
-    for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
-      for (int x = 0; x < size; ++x) {
-        glm::dvec3 sum(0.0);
-        for (int s = 0; s < options.samples_per_pixel; ++s) {
-          const SampleStream stream =
-              tracing::sample_stream(options.seed,
-                                     static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(size) +
-                                         static_cast<std::uint64_t>(x),
-                                     static_cast<std::uint32_t>(s));
-          const glm::vec2 place =
-              (glm::vec2(x, row % size) + stream.get(tracing::camera_dimension)) / static_cast<float>(size);
-          const Ray ray{origin - world.rays.origin(),
-                        glm::normalize(direction_from_cube(row / size, place.x, place.y))};
-          const Hit hit = view.intersect(ray, Coherence::coherent);
-          sum += glm::dvec3(tracing::radiance(world, ray, hit, limits, stream, 0));
-        }
-        const glm::vec3 mean(sum / static_cast<double>(options.samples_per_pixel));
-        std::copy_n(&mean.x, 3, image.at(x, row));
-      }
-    }
-  });
-  return image;
+  const glm::vec3 eye = origin - world.rays.origin();
+  const auto ray_through = [&](int row, glm::vec2 point) {
+    // Rows count through all faces.
+    const int face = row / size;
+    const glm::vec2 place = (point - glm::vec2(0, face * size)) / static_cast<float>(size);
+    return Ray{eye, glm::normalize(direction_from_cube(face, place.x, place.y))};
+  };
+  return trace_image(world, view, size, 6 * size, options, ray_through);
 }
 
 std::vector<RayHit> Tracer::intersect(std::span<const glm::vec3> origins,

@@ -12,6 +12,7 @@
 
 #include "bind.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/scene/load.hpp"
 #include "mirrorbake/scene/room.hpp"
 #include "mirrorbake/scene/scene.hpp"
 #include "mirrorbake/scene/shapes.hpp"
@@ -132,6 +133,13 @@ void bind_shapes(nb::module_& m) {
         nb::arg("segments") = 48, Released(), "Torus about the vertical axis through `centre`.");
   m.def("make_rectangle", &make_rectangle, nb::arg("corner"), nb::arg("u"), nb::arg("v"), Released(),
         "Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.");
+  m.def(
+      "load_mesh", [](const std::string& path) { return load_mesh(path); }, nb::arg("path"), Released(),
+      "Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied "
+      "(instances\n"
+      "become copies) and missing vertex normals made by angle-weighted averaging. Raises FileError if the "
+      "file is\n"
+      "missing, corrupt, empty or refers to files outside its directory.");
 }
 
 void bind_material(nb::module_& m) {
@@ -140,8 +148,7 @@ void bind_material(nb::module_& m) {
       .value("schlick", FresnelModel::schlick, "Schlick's approximation from r0")
       .value("dielectric", FresnelModel::dielectric, "unpolarised, relative index eta")
       .value("conductor", FresnelModel::conductor, "unpolarised, complex index eta + i k");
-  nb::class_<Fresnel>(m, "Fresnel",
-                      "Reflectance per colour channel as a function of the angle.")
+  nb::class_<Fresnel>(m, "Fresnel", "Reflectance per colour channel as a function of the angle.")
       .def(
           "__init__",
           [](Fresnel* self, FresnelModel model, glm::vec3 r0, glm::vec3 eta, glm::vec3 k) {

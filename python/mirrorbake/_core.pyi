@@ -357,6 +357,13 @@ def make_rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[floa
     Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.
     """
 
+def load_mesh(path: str) -> TriangleMesh:
+    """
+    Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied (instances
+    become copies) and missing vertex normals made by angle-weighted averaging. Raises FileError if the file is
+    missing, corrupt, empty or refers to files outside its directory.
+    """
+
 class FresnelModel(enum.Enum):
     """How the reflectance of a mirror depends on the angle."""
 

@@ -1,5 +1,7 @@
 """Scenes from Python: what goes in comes out, and what is wrong is named."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -101,6 +103,17 @@ def test_scene_errors_name_the_culprit() -> None:
         scene.bounds(7)
     with pytest.raises(TypeError):
         scene.add_texture(np.zeros((2, 2, 4), dtype=np.float32))
+
+
+def test_load_mesh_reads_a_file_and_names_what_is_wrong_with_it(tmp_path: Path) -> None:
+    path = tmp_path / "triangle.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n")
+    mesh = _core.load_mesh(str(path))
+    np.testing.assert_array_equal(mesh.positions, TRIANGLE)
+    np.testing.assert_array_equal(mesh.normals, np.tile([0, 0, 1], (3, 1)))
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n")
+    with pytest.raises(_core.FileError, match=r"triangle\.obj: line 3 has 'nan'"):
+        _core.load_mesh(str(path))
 
 
 def test_teapot_in_its_room_is_a_valid_scene() -> None:

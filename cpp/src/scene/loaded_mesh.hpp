@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "mirrorbake/scene/load.hpp"
+#include "mirrorbake/scene/scene.hpp"
+
+/// What the readers of OBJ and glTF have in common.
+namespace mirrorbake {
+
+/// A stretch of triangles that belong together in the file.
+struct MeshGroup {
+  std::string name;
+  int material = -1;               ///< index into the file's materials, −1: none
+  std::size_t first_triangle = 0;  ///< up to the next group's
+};
+
+/// Everything in one mesh in world space, with its groups in order. Normals and uvs are complete or empty.
+struct LoadedMesh {
+  TriangleMesh mesh;
+  std::vector<MeshGroup> groups;
+};
+
+LoadedMesh read_obj(const std::string& path, const MeshLimits& limits);
+LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits);
+
+/// Throws FileError naming the first vertex, from number `first` on, that is not finite or beyond what a scene accepts.
+void check_positions(const std::string& path, const std::vector<glm::vec3>& positions, std::size_t first = 0);
+
+/// Throws FileError if one vertex or triangle more than `vertices` and `triangles` is beyond `limits`.
+void check_limits(const std::string& path, std::uint64_t vertices, std::uint64_t triangles,
+                  const MeshLimits& limits);
+
+/// Gives every vertex from `first_vertex` on whose normal is missing (shorter than 1e-6) the mean of the facet normals
+/// around it, weighted with the angle of the facet (Thürmer and Wüthrich, "Computing vertex normals from polygonal
+/// facets", JGT 3(1), 1998). Vertices at the same place count as one: files often split them for texture
+/// coordinates. Others are normalised.
+void complete_normals(TriangleMesh& mesh, std::size_t first_vertex = 0, std::size_t first_triangle = 0);
+
+/// Drops triangles without area and then vertices that no triangle uses. Throws FileError if nothing remains.
+void drop_degenerate(const std::string& path, LoadedMesh& loaded);
+
+}  // namespace mirrorbake

@@ -2,7 +2,8 @@
 
 Cases: `A x` for three channels; and a number of steps of least squares for three channels, without
 regularisation, from zero. SciPy's LSQR takes one right-hand side at a time and is given the same
-preconditioner: columns scaled to unit length. The error is that of b against float64, or the residual's norm over that of b.
+preconditioner: columns scaled to unit length. The error is that of b against float64, or the
+norm of the residual over that of b.
 """
 
 from collections.abc import Iterator

@@ -113,7 +113,7 @@ void check_limits(const std::string& path, std::int64_t width, std::int64_t heig
   }
 }
 
-bool is_integer(OIIO::TypeDesc format) {
+bool is_integer(const OIIO::TypeDesc& format) {
   return !format.is_floating_point();
 }
 

@@ -64,7 +64,8 @@ glm::vec3 y_up(const glm::dvec3& p) {
 // and v downwards for somebody who looks at the pot; both are turned round.
 glm::vec2 chart_uv(std::size_t patch, double u, double v) {
   const double column = static_cast<double>(patch % kPatchesPerBand);
-  const double row = static_cast<double>(patch / kPatchesPerBand);
+  const std::size_t band = patch / kPatchesPerBand;
+  const double row = static_cast<double>(band);
   const double width = 1.0 - 2.0 * kChartInset;
   return {static_cast<float>(1.0 - (column + kChartInset + width * u) / static_cast<double>(kPatchesPerBand)),
           static_cast<float>(1.0 - (row + kChartInset + width * v) / static_cast<double>(kBandCount))};

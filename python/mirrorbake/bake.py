@@ -1,0 +1,275 @@
+"""The bake: for every view of the arc, trace the layers, build rendering matrices, solve, store."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.errors import InputError, StoreError
+from mirrorbake.run_time import images_of_trace, proxy_from_attributes, proxy_to_attributes
+from mirrorbake.scene import hash_inputs, prepare_stage
+from mirrorbake.store import GROUP_NAME, Header, PemStore, Source, Timings, exclusive
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from mirrorbake.config import SceneConfig
+    from mirrorbake.metrics import FloatArray
+    from mirrorbake.scene import BuiltScene, Stage
+
+ProgressReport: TypeAlias = Callable[[int, int, str], None]
+"""Called with steps done, steps in all, and what is going on."""
+
+PILOT_VIEWS = 5
+PILOT_SIDE = 128
+"""Views, and pixels along a side, of the trial traces that decide on layers and fit the distant box."""
+
+LARGEST_BOX = 1e4
+"""Metres; hits further away are as good as infinite and do not shape a box."""
+
+
+@dataclass(frozen=True)
+class BakeSummary:
+    """What a bake did."""
+
+    views: int
+    resumed: int
+    """How many of the views were there already."""
+    clamped: int
+    """Values of the maps that float16 could not hold."""
+
+
+def bake(
+    config: SceneConfig,
+    directory: Path,
+    progress: ProgressReport | None = None,
+    stage: Stage | None = None,
+) -> BakeSummary:
+    """Bake a scene's PEM into a folder, or finish one that was interrupted.
+
+    Parameters
+    ----------
+    config
+        The scene.
+    directory
+        Made if it does not exist. If it holds a PEM of the same scene, only what is missing is baked.
+    progress
+        Told about every view.
+    stage
+        The scene, if it has been prepared already.
+
+    Raises
+    ------
+    StoreError
+        The folder cannot be written to, holds something else, or a PEM of another scene.
+    InputError
+        The scene is not usable. Nothing has been written then.
+    """
+    report = progress or (lambda done, total, text: None)
+    source = Source(_core.version(), json.loads(config.model_dump_json()), hash_inputs(config))
+    _check_output(directory, source)
+    total = config.views.count
+    report(0, total, "preparing the scene")
+    stage = stage or prepare_stage(config)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as failure:
+        raise StoreError(f"{directory}: cannot write: {failure.strerror or failure}") from None
+    with exclusive(directory):
+        if PemStore.exists(directory):
+            store = PemStore.open(directory, writable=True)
+            store.remove_stray_files()
+        else:
+            store = _create_store(stage, source, directory)
+        done = store.completed()
+        resumed = int(done.sum())
+        capture = _core.build_cube_pyramid(store.read_capture())
+        baker = _ViewBaker(stage, store, capture)
+        clamped = 0
+        for index in range(total):
+            if not done[index]:
+                report(index, total, f"view {index + 1} of {total}")
+                clamped += baker.bake_view(index)
+        report(total, total, f"{total} views")
+    return BakeSummary(views=total, resumed=resumed, clamped=clamped)
+
+
+def _check_output(directory: Path, source: Source) -> None:
+    if not directory.exists():
+        return
+    if not directory.is_dir():
+        raise StoreError(f"{directory}: is a file, expected a folder for the PEM")
+    if PemStore.exists(directory):
+        existing = PemStore.open(directory).header.source
+        if existing.fingerprint != source.fingerprint:
+            raise StoreError(
+                f"{directory}: holds a PEM of another scene ({source.difference_from(existing)}); "
+                "bake to another folder or remove it"
+            )
+    elif any(entry.name != f".{GROUP_NAME}.partial" for entry in directory.iterdir()):
+        raise StoreError(f"{directory}: is not empty and holds no PEM; expected a new or an empty folder")
+
+
+def _create_store(stage: Stage, source: Source, directory: Path) -> PemStore:
+    config, built, tracer = stage.config, stage.built, stage.tracer
+    pilot = _run_pilot(stage)
+    origin = tuple(_core.area_weighted_centroid(built.positions, built.triangles))
+    box = _fit_box(config, pilot.hits, origin, built)
+    infinite = proxy_to_attributes(_core.Proxy.infinite(origin))
+    use_box = config.maps.distant == "box" or (
+        config.maps.distant == "auto" and config.surroundings.room is not None
+    )
+    if use_box and box is None:
+        raise InputError(
+            "maps.distant = 'box': the object sees no surroundings at a distance to fit a box to"
+        )
+    distant = box if use_box and box is not None else infinite
+    parts = []
+    for number, name in enumerate(built.part_names):
+        layers: dict[str, Any] = {}
+        shows_itself = pilot.local_parts[number]
+        if config.layers.local == "on" or (config.layers.local == "auto" and shows_itself):
+            layers["local"] = _local_ellipsoid(built, number)
+        layers["distant"] = distant
+        parts.append({"name": name, "layers": layers})
+    size = config.maps.size
+    capture = tracer.capture_cube(origin, size, [built.reflector], stage.options)
+    irradiance = None
+    if built.has_diffuse:
+        irradiance = tracer.vertex_irradiance(built.reflector, DIFFUSE_RAYS, config.trace.seed)
+    header = Header(
+        source=source,
+        parameters=config.views.parameters(),
+        parts=parts,
+        static={"infinite": infinite, "box": box},
+        map_size=size,
+        precision=config.maps.precision,
+        image_size=config.views.size,
+    )
+    return PemStore.create(directory, header, capture, irradiance)
+
+
+DIFFUSE_RAYS = 1024
+"""Gather rays per vertex of the diffuse layer."""
+
+
+@dataclass(frozen=True)
+class _Pilot:
+    local_parts: NDArray[np.bool_]
+    hits: FloatArray
+
+
+def _run_pilot(stage: Stage) -> _Pilot:
+    config, built = stage.config, stage.built
+    width, height = config.views.size
+    shrink = min(1.0, PILOT_SIDE / max(width, height))
+    options = stage.options
+    options.samples_per_pixel = 1
+    local = np.zeros(len(built.part_names), bool)
+    hits = []
+    for t in np.linspace(0.0, 1.0, min(PILOT_VIEWS, config.views.count)):
+        camera = built.arc.camera(float(t))
+        camera.width, camera.height = max(1, round(width * shrink)), max(1, round(height * shrink))
+        samples = stage.tracer.trace_layers(camera, built.reflector, options).samples
+        part = np.asarray(samples.part)
+        alpha = np.asarray(samples.local)[:, 3]
+        local |= np.bincount(part, weights=alpha > 0.0, minlength=local.size) > 0
+        distance = np.asarray(samples.hit_distance)
+        near = distance < LARGEST_BOX
+        points = np.asarray(samples.position)[near]
+        hits.append(points + distance[near, None] * np.asarray(samples.reflection)[near])
+    return _Pilot(local, np.concatenate(hits).astype(np.float32))
+
+
+MIN_BOX_HITS = 100
+
+
+def _fit_box(
+    config: SceneConfig, hits: FloatArray, origin: Sequence[float], built: BuiltScene
+) -> dict[str, Any] | None:
+    if len(hits) < MIN_BOX_HITS or config.surroundings.room is None:
+        return None
+    if config.maps.box == "mean_distance":
+        box = _core.fit_box_mean_distance(hits, origin, float(built.positions[:, 1].min()))
+    else:
+        box = _core.fit_box_robust(hits, origin)
+    return proxy_to_attributes(box)
+
+
+def _local_ellipsoid(built: BuiltScene, part: int) -> dict[str, Any]:
+    triangles = built.triangles[built.parts == part]
+    centre = _core.area_weighted_centroid(built.positions, triangles)
+    return proxy_to_attributes(_core.fit_ellipsoid(built.positions[np.unique(triangles)], centre))
+
+
+class _ViewBaker:
+    def __init__(self, stage: Stage, store: PemStore, capture: FloatArray) -> None:
+        config = stage.config
+        self._stage = stage
+        self._config = config
+        self._store = store
+        self._capture = capture
+        self._layout = _core.CubePyramidLayout(config.maps.size)
+        self._lookup = _core.LookupOptions(footprint_scale=config.infer.footprint_scale)
+        self._solve = _core.SolveOptions(
+            smoothness=config.infer.smoothness,
+            level_agreement=config.infer.level_agreement,
+            prior_weight=config.infer.prior_weight,
+            tolerance=config.infer.tolerance,
+            max_iterations=config.infer.iterations,
+        )
+
+    def bake_view(self, index: int) -> int:
+        """Bake one view; returns how many values had to be clamped."""
+        start = time.perf_counter()
+        trace = self._stage.trace(self._store.header.parameters[index])
+        trace_s = time.perf_counter() - start
+        build_s = solve_s = 0.0
+        maps = {}
+        for number, part in enumerate(self._store.header.parts):
+            for layer, description in part["layers"].items():
+                start = time.perf_counter()
+                matrix = _core.build_rendering_matrix(
+                    trace.samples, number, proxy_from_attributes(description), self._layout, self._lookup
+                )
+                values = self._values(trace.samples, layer, "local" in part["layers"])
+                target = matrix.average(trace.samples, number, values)
+                middle = time.perf_counter()
+                initial = self._initial(part["name"], layer, index)
+                maps[part["name"], layer] = self._infer(matrix, target, layer, initial)
+                build_s += middle - start
+                solve_s += time.perf_counter() - middle
+        return self._store.write_view(index, maps, images_of_trace(trace), Timings(trace_s, build_s, solve_s))
+
+    def _values(self, samples: _core.SurfaceSamples, layer: str, has_local: bool) -> FloatArray:
+        local = np.asarray(samples.local)
+        if layer == "local":
+            return local
+        distant = np.asarray(samples.distant)
+        return distant if has_local else local[:, :3] + (1.0 - local[:, 3:]) * distant
+
+    def _initial(self, part: str, layer: str, index: int) -> FloatArray | None:
+        # The neighbour as it was stored, so that a resumed bake starts from the same values.
+        if index > 0:
+            return self._store.read_map(part, layer, index - 1)
+        return self._capture if layer == "distant" else None
+
+    def _infer(
+        self, matrix: _core.RenderingMatrix, target: FloatArray, layer: str, initial: FloatArray | None
+    ) -> FloatArray:
+        if matrix.rows == 0:
+            channels = target.shape[1]
+            return np.zeros((self._layout.texels, channels), np.float32) if initial is None else initial
+        weights = _core.display_row_weights(matrix, self._config.trace.samples, target)
+        solver = _core.MapSolver(matrix, weights, self._layout, self._solve)
+        captured = layer == "distant" and self._config.infer.prior == "captured"
+        texels, _ = solver.solve(target, self._capture if captured else None, initial)
+        return np.asarray(texels)

@@ -1,0 +1,270 @@
+"""The command line. Data goes to stdout, progress and messages to stderr.
+
+Exit status: 0 success, 2 wrong usage, 3 bad input, 4 a computation that cannot give an answer, 130
+interrupted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from mirrorbake import _core
+from mirrorbake.bake import ProgressReport, bake
+from mirrorbake.config import load_config, parse_override
+from mirrorbake.demo import run_demo
+from mirrorbake.errors import InputError
+from mirrorbake.evaluate import METRICS_NAME, evaluate
+from mirrorbake.render import render
+from mirrorbake.report import metrics_table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+EXIT_INPUT = 3
+EXIT_NUMERICAL = 4
+EXIT_INTERRUPTED = 130
+
+app = typer.Typer(
+    name="mirrorbake",
+    help="Bake the reflections of shiny objects into parameterized environment maps.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+messages = Console(stderr=True, highlight=False)
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def _fail(text: str, status: int) -> typer.Exit:
+    # One line whatever the text holds; rich would wrap it and read brackets as markup.
+    typer.echo("mirrorbake: error: " + " ".join(text.split()), err=True)
+    return typer.Exit(status)
+
+
+def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
+    """Turn the errors of bad input into one line and an exit status."""
+
+    @functools.wraps(command)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return command(*args, **kwargs)
+        except (InputError, _core.InvalidArgument, OSError) as failure:
+            raise _fail(str(failure), EXIT_INPUT) from None
+        except MemoryError:
+            raise _fail("not enough memory for images and maps of this size", EXIT_INPUT) from None
+        except ArithmeticError as failure:
+            raise _fail(str(failure), EXIT_NUMERICAL) from None
+        except KeyboardInterrupt:
+            raise _fail("interrupted", EXIT_INTERRUPTED) from None
+
+    return wrapped
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[str], ProgressReport]]:
+    """Show progress bars on stderr; what is yielded adds one."""
+    columns = (
+        TextColumn("[bold]{task.fields[title]}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=messages) as bars:
+
+        def add(title: str) -> ProgressReport:
+            task = bars.add_task("", title=title)
+
+            def report(done: int, total: int, text: str) -> None:
+                bars.update(task, completed=done, total=total, description=text)
+
+            return report
+
+        yield add
+
+
+def _parse_size(text: str) -> list[int]:
+    width, separator, height = text.lower().partition("x")
+    if not separator or not all(part.isascii() and part.isdigit() for part in (width, height)):
+        raise typer.BadParameter(f"{text!r}: expected WIDTHxHEIGHT in pixels, such as 512x512")
+    return [int(width), int(height)]
+
+
+def _parse_set(text: str) -> tuple[tuple[str, ...], Any]:
+    try:
+        return parse_override(text)
+    except InputError as failure:
+        raise typer.BadParameter(str(failure)) from None
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"mirrorbake {_core.version()}")
+        raise typer.Exit
+
+
+Threads = Annotated[
+    int, typer.Option("--threads", min=0, max=1024, metavar="N", help="Threads at most; 0: all cores.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")]
+Folder = Annotated[
+    Path, typer.Argument(metavar="DIR", help="Folder with a finished PEM.", show_default=False)
+]
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command("bake")
+@reports_errors
+def bake_command(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Folder for the PEM; resumes one of the same scene.",
+            show_default=False,
+        ),
+    ],
+    views: Annotated[
+        int | None,
+        typer.Option("--views", metavar="N", help="Number of views on the arc. [default: views.count]"),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option("--size", metavar="WxH", help="Pixels. [default: views.size]"),
+    ] = None,
+    spp: Annotated[
+        int | None,
+        typer.Option("--spp", metavar="N", help="Samples per pixel. [default: trace.samples]"),
+    ] = None,
+    em_size: Annotated[
+        int | None,
+        typer.Option(
+            "--em-size", metavar="N", help="Texels along a side of a map's face. [default: maps.size]"
+        ),
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", metavar="N", help="[default: trace.seed]")] = None,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Any key of the scene file: --set reflector.mesh=bunny.obj"
+        ),
+    ] = None,
+    threads: Threads = 0,
+) -> None:
+    """Bake a scene's reflections into one set of environment maps per view of the arc."""
+    overrides = [_parse_set(text) for text in assignments or []]
+    for key, value in (
+        ("views.count", views),
+        ("views.size", None if size is None else _parse_size(size)),
+        ("trace.samples", spp),
+        ("maps.size", em_size),
+        ("trace.seed", seed),
+    ):
+        if value is not None:
+            section, name = key.split(".")
+            overrides.append(((section, name), value))
+    config = load_config(scene, overrides)
+    limit = _core.ThreadLimit(threads)
+    with _progress() as add_bar:
+        summary = bake(config, out, add_bar("bake"))
+    del limit
+    if summary.clamped:
+        messages.print(
+            f"warning: {summary.clamped} values above 65504 were clamped; "
+            "maps.precision = 'float32' keeps them",
+            markup=False,
+        )
+    resumed = f", {summary.resumed} of them from an earlier run" if summary.resumed else ""
+    messages.print(f"{out}: {summary.views} views{resumed}", markup=False, soft_wrap=True)
+
+
+@app.command("evaluate")
+@reports_errors
+def evaluate_command(directory: Folder, json: Json = False, threads: Threads = 0) -> None:
+    """Compare a PEM and static maps with ray tracing, on the sampled views and half-way between them."""
+    limit = _core.ThreadLimit(threads)
+    with _progress() as add_bar:
+        evaluation = evaluate(directory, add_bar("evaluate"))
+    del limit
+    if json:
+        typer.echo(evaluation.to_json(), nl=False)
+    else:
+        Console(highlight=False).print(metrics_table(evaluation))
+    messages.print(f"wrote {directory / METRICS_NAME}", markup=False, soft_wrap=True)
+
+
+@app.command("render")
+@reports_errors
+def render_command(
+    directory: Folder,
+    view: Annotated[
+        float,
+        typer.Option("--view", metavar="T", help="Parameter of the arc, from 0 to 1.", show_default=False),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", metavar="FILE", help="An .exr (scene-linear) or a .png (sRGB).", show_default=False
+        ),
+    ],
+    threads: Threads = 0,
+) -> None:
+    """Draw a PEM at any parameter of its arc, blended between the neighbouring views."""
+    limit = _core.ThreadLimit(threads)
+    render(directory, view, out)
+    del limit
+    messages.print(f"wrote {out}", markup=False, soft_wrap=True)
+
+
+@app.command("demo")
+@reports_errors
+def demo_command(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")] = Path(
+        "out/demo"
+    ),
+    json: Json = False,
+    threads: Threads = 0,
+) -> None:
+    """Bake and evaluate a small teapot scene: about a minute on two cores."""
+    limit = _core.ThreadLimit(threads)
+    with _progress() as add_bar:
+        evaluation, sheet = run_demo(out, add_bar)
+    del limit
+    if json:
+        typer.echo(evaluation.to_json(), nl=False)
+    else:
+        Console(highlight=False).print(metrics_table(evaluation))
+    messages.print(f"wrote {out / METRICS_NAME} and {sheet}", markup=False, soft_wrap=True)
+
+
+def main() -> None:
+    """Run the command line; never returns."""
+    app()

@@ -1,0 +1,167 @@
+"""Drawing the reflector from maps, in software: the PEM at any parameter, and its static competitors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.errors import InputError
+from mirrorbake.store import ViewImages
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from mirrorbake.metrics import FloatArray
+    from mirrorbake.store import Header, PemStore
+
+CONTENDERS = ("pem", "static_infinite", "static_box")
+"""What an evaluation compares with ray tracing, in the order of its tables."""
+
+TITLES = {"pem": "PEM", "static_infinite": "Static map at infinity", "static_box": "Static map on the box"}
+"""How tables and pictures call the contenders."""
+
+
+def proxy_from_attributes(description: Mapping[str, Any]) -> _core.Proxy:
+    """Return the proxy that a PEM's attributes describe."""
+    shape, origin = description["shape"], description["origin"]
+    if shape == "box":
+        return _core.Proxy.box(description["centre"], description["half_extent"], origin)
+    if shape == "ellipsoid":
+        return _core.Proxy.ellipsoid(description["centre"], description["radii"], origin)
+    return _core.Proxy.infinite(origin)
+
+
+def proxy_to_attributes(proxy: _core.Proxy) -> dict[str, Any]:
+    """Inverse of `proxy_from_attributes`, for axis-aligned shapes."""
+    fields = {"infinite": (), "box": ("centre", "half_extent"), "ellipsoid": ("centre", "radii")}[proxy.kind]
+    description: dict[str, Any] = {"shape": proxy.kind}
+    for field in (*fields, "origin"):
+        description[field] = [float(x) for x in getattr(proxy, field)]
+    return description
+
+
+def images_of_trace(trace: _core.LayerTrace) -> ViewImages:
+    """Separate the object from what is behind it in a ray-traced view."""
+    samples = trace.samples
+    shape = (samples.height, samples.width)
+    pixel = np.asarray(samples.pixel)
+    count = np.bincount(pixel, minlength=shape[0] * shape[1])
+    beauty = np.asarray(trace.sample_beauty)
+    total = np.stack(
+        [np.bincount(pixel, weights=beauty[:, c], minlength=count.size) for c in range(3)], axis=-1
+    )
+    coverage = (count / samples.samples_per_pixel).reshape(shape)
+    light = (total / np.maximum(count, 1)[:, None]).reshape(*shape, 3)
+    channels = list(trace.channels)
+    picture = np.asarray(trace.layers)[..., [channels.index(name) for name in "RGB"]]
+    # Where the object covers the whole pixel the difference is rounding, not light.
+    background = np.where(coverage[..., None] < 1.0, picture - coverage[..., None] * light, 0.0)
+    return ViewImages(
+        object=light.astype(np.float32),
+        coverage=coverage.astype(np.float32),
+        background=np.maximum(background, 0.0).astype(np.float32),
+    )
+
+
+@dataclass
+class RunTime:
+    """A PEM opened for drawing.
+
+    Maps of two neighbouring views are kept in memory, so that walking along the arc reads each view once.
+    """
+
+    store: PemStore
+    triangles: NDArray[np.uint32]
+    """(T, 3) of the reflector."""
+
+    def __post_init__(self) -> None:
+        self._header: Header = self.store.header
+        self._layout = _core.CubePyramidLayout(self._header.map_size)
+        self._options = _core.LookupOptions(
+            footprint_scale=self._header.source.config["infer"]["footprint_scale"]
+        )
+        self._irradiance = self.store.read_irradiance()
+        self._static = _core.build_cube_pyramid(self.store.read_capture())
+        self._views: dict[int, dict[tuple[str, str], FloatArray]] = {}
+
+    @property
+    def has_box(self) -> bool:
+        """Whether the static map on a finite box is a contender."""
+        return self._header.static["box"] is not None
+
+    def neighbours(self, t: float) -> tuple[int, int, float]:
+        """Views on both sides of a parameter and the weight of the second.
+
+        Raises
+        ------
+        InputError
+            t is outside [0,1].
+        """
+        if not 0.0 <= t <= 1.0:
+            raise InputError(f"view = {t:g}: expected a parameter of the arc, from 0 to 1")
+        parameters = self._header.parameters
+        place = t * (len(parameters) - 1)
+        nearest = round(place)
+        # A parameter that was printed with a few digits still means the sampled view.
+        if abs(place - nearest) < 1e-6:
+            return nearest, nearest, 0.0
+        first = int(place)
+        return first, first + 1, place - first
+
+    def render(self, contender: str, t: float, samples: _core.SurfaceSamples) -> FloatArray:
+        """Draw the reflector.
+
+        Parameters
+        ----------
+        contender
+            One of `CONTENDERS`.
+        t
+            Parameter in [0,1]; between two views the PEM blends their maps linearly.
+        samples
+            Where the camera of t sees the reflector.
+
+        Returns
+        -------
+        array
+            Radiance (H, W, 3), the mean over the samples that see the reflector; 0 where there are none.
+        """
+        if contender == "pem":
+            parts = self._pem_parts(*self.neighbours(t))
+        else:
+            parts = self._static_parts("infinite" if contender == "static_infinite" else "box")
+        diffuse = None
+        if self._irradiance is not None:
+            diffuse = _core.diffuse_from_irradiance(samples, self.triangles, self._irradiance)
+        image = _core.render_reflector(samples, parts, self._layout, diffuse, self._options)
+        coverage = image[..., 3:]
+        return np.divide(image[..., :3], coverage, out=np.zeros_like(image[..., :3]), where=coverage > 0.0)
+
+    def _pem_parts(self, first: int, second: int, weight: float) -> list[_core.PartMaps]:
+        self._views = {i: self._views.get(i) or self._read_view(i) for i in {first, second}}
+        parts = []
+        for part in self._header.parts:
+            maps = {}
+            for layer in part["layers"]:
+                a = self._views[first][part["name"], layer]
+                b = self._views[second][part["name"], layer]
+                maps[layer] = a if weight == 0.0 else np.float32(1.0 - weight) * a + np.float32(weight) * b
+            distant = proxy_from_attributes(part["layers"]["distant"])
+            if "local" in maps:
+                local = proxy_from_attributes(part["layers"]["local"])
+                parts.append(_core.PartMaps(distant, maps["distant"], local, maps["local"]))
+            else:
+                parts.append(_core.PartMaps(distant, maps["distant"]))
+        return parts
+
+    def _read_view(self, index: int) -> dict[tuple[str, str], FloatArray]:
+        return {name: self.store.read_map(*name, index) for name in self._header.map_names()}
+
+    def _static_parts(self, shape: str) -> list[_core.PartMaps]:
+        static = self._header.static
+        proxy = proxy_from_attributes(static["box"] if shape == "box" else static["infinite"])
+        return [_core.PartMaps(proxy, self._static) for _ in self._header.parts]

@@ -1,0 +1,314 @@
+"""From a scene file to what the ray tracer takes, and to the cameras of the views."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.config import PATH_KEYS
+from mirrorbake.errors import InputError
+from mirrorbake.files import sha256_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from mirrorbake.config import MaterialConfig, Reflector, SceneConfig, Surroundings, Views
+    from mirrorbake.metrics import FloatArray
+
+DEFAULT_ELEVATION_DEGREES = 20.0
+FRAME_FILL = 0.9
+"""Fraction of the frame's height that the object's bounding sphere takes at the default distance."""
+
+REFLECTOR_NAME = "reflector"
+GROUND_THICKNESS = 0.02
+
+
+@dataclass(frozen=True)
+class Arc:
+    """The path of the eye: a circular arc about the vertical through `centre`. Lengths in metres."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    height: float
+    start: float
+    degrees: float
+    fov: float
+    size: tuple[int, int]
+
+    def eye(self, t: float) -> tuple[float, float, float]:
+        """Return the eye's position for t in [0,1], world space."""
+        angle = math.radians(self.start + t * self.degrees)
+        x, y, z = self.centre
+        return (x + self.radius * math.sin(angle), y + self.height, z + self.radius * math.cos(angle))
+
+    def camera(self, t: float) -> _core.Camera:
+        """Return the camera for t in [0,1]."""
+        width, height = self.size
+        return _core.Camera(
+            self.eye(t), self.centre, vertical_fov_degrees=self.fov, width=width, height=height
+        )
+
+
+@dataclass(frozen=True)
+class BuiltScene:
+    """A scene ready for tracing, and what the bake needs to know of its reflector."""
+
+    scene: _core.Scene
+    reflector: int
+    """Number of the object."""
+    positions: FloatArray
+    """(V, 3) of the reflector, world space."""
+    triangles: NDArray[np.uint32]
+    """(T, 3)."""
+    parts: NDArray[np.uint16]
+    """(T,) part of every triangle."""
+    part_names: list[str]
+    has_diffuse: bool
+    arc: Arc
+
+
+def hash_inputs(config: SceneConfig) -> dict[str, dict[str, str]]:
+    """Files that a scene uses, as {key: {path, sha256}}.
+
+    Raises
+    ------
+    InputError
+        One cannot be read; the message names it.
+    """
+    inputs = {}
+    for section, key in PATH_KEYS:
+        path = getattr(getattr(config, section), key)
+        if path is not None:
+            inputs[f"{section}.{key}"] = {"path": path, "sha256": sha256_of(Path(path))}
+    return inputs
+
+
+def build_scene(config: SceneConfig) -> BuiltScene:
+    """Build everything that a scene file describes.
+
+    Raises
+    ------
+    InputError
+        A view lies inside the reflector.
+    mirrorbake.FileError
+        A mesh or an image is missing or corrupt.
+    mirrorbake.InvalidArgument
+        The scene is not usable: vertices that are not finite, no area.
+    """
+    scene = (
+        _core.make_room() if config.surroundings.room is not None else _panorama_scene(config.surroundings)
+    )
+    mesh, part_names = _load_reflector(config.reflector)
+    material = _material(config.material, scene)
+    reflector = scene.add_object(REFLECTOR_NAME, mesh, material, part_names)
+    positions = np.asarray(mesh.positions)
+    triangles = np.asarray(mesh.triangles)
+    parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
+    arc = _resolve_arc(config.views, positions)
+    for t in config.views.parameters():
+        if winding_number(positions, triangles, np.array(arc.eye(t))) > 0.5:
+            raise InputError(
+                f"views: the eye at t = {t:.4g}, {_vector(arc.eye(t))}, lies inside the reflector; "
+                "expected a view from outside"
+            )
+    return BuiltScene(
+        scene=scene,
+        reflector=reflector,
+        positions=positions,
+        triangles=triangles,
+        parts=parts,
+        part_names=part_names,
+        has_diffuse=any(config.material.albedo),
+        arc=arc,
+    )
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A scene and its ray tracer: slow to prepare, so a bake and its evaluation can share it."""
+
+    config: SceneConfig
+    built: BuiltScene
+    tracer: _core.Tracer
+
+    @property
+    def options(self) -> _core.TraceOptions:
+        """Options of every view. All views share the seed: a view is the same in every bake."""
+        trace = self.config.trace
+        return _core.TraceOptions(samples_per_pixel=trace.samples, seed=trace.seed)
+
+    def visibility(self, t: float) -> _core.SurfaceSamples:
+        """Where the camera of t sees the reflector."""
+        return self.tracer.trace_visibility(self.built.arc.camera(t), self.built.reflector, self.options)
+
+    def trace(self, t: float) -> _core.LayerTrace:
+        """Ray trace the layers of the view of t."""
+        return self.tracer.trace_layers(self.built.arc.camera(t), self.built.reflector, self.options)
+
+
+def prepare_stage(config: SceneConfig) -> Stage:
+    """Build a scene and make it ready for tracing; raises as `build_scene` does."""
+    built = build_scene(config)
+    options = _core.TracerOptions(
+        indirect=getattr(_core.IndirectLight, config.trace.indirect),
+        cache_rays=config.trace.cache_rays,
+        seed=config.trace.seed,
+    )
+    return Stage(config, built, _core.Tracer(built.scene, options))
+
+
+def winding_number(positions: FloatArray, triangles: NDArray[np.uint32], point: NDArray[np.float64]) -> float:
+    """Return how often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between.
+
+    The sum of the triangles' signed solid angles over 4π (van Oosterom and Strackee, The solid angle of a
+    plane triangle, IEEE Trans. Biomed. Eng. 30(2), 1983).
+
+    Parameters
+    ----------
+    positions
+        Shape (V, 3).
+    triangles
+        Shape (T, 3), counter-clockwise seen from outside.
+    point
+        Shape (3,).
+    """
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    if np.any(point < low) or np.any(point > high):
+        return 0.0
+    corners = positions.astype(np.float64)[triangles] - point
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    numerator = np.einsum("ij,ij->i", a, np.cross(b, c))
+    denominator = (
+        la * lb * lc
+        + np.einsum("ij,ij->i", a, b) * lc
+        + np.einsum("ij,ij->i", b, c) * la
+        + np.einsum("ij,ij->i", c, a) * lb
+    )
+    return float(np.sum(2.0 * np.arctan2(numerator, denominator)) / (4.0 * math.pi))
+
+
+def rotation_matrix(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Rotate about x, then y, then z: the matrix `world_from_object`, shape (3, 3)."""
+    (sx, cx), (sy, cy), (sz, cz) = ((math.sin(math.radians(d)), math.cos(math.radians(d))) for d in degrees)
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    rotation: NDArray[np.float64] = about_z @ about_y @ about_x
+    return rotation
+
+
+def _vector(v: tuple[float, float, float]) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in v) + ")"
+
+
+def _load_reflector(reflector: Reflector) -> tuple[_core.TriangleMesh, list[str]]:
+    if reflector.mesh is None:
+        mesh = _core.make_teapot(reflector.subdivisions, reflector.height)
+    else:
+        mesh = _core.load_mesh(reflector.mesh)
+    rotation = rotation_matrix(reflector.rotation)
+    positions = np.asarray(mesh.positions).astype(np.float64) @ rotation.T
+    if reflector.mesh is not None:
+        positions = _stand_on_ground(positions, reflector)
+    split = reflector.object is not None and reflector.parts == "split"
+    names = _core.teapot_part_names() if split else [reflector.object or "object"]
+    # Rotation and uniform scale leave normals unit vectors.
+    normals = (np.asarray(mesh.normals).astype(np.float64) @ rotation.T).astype(np.float32)
+    placed = _core.TriangleMesh(
+        (positions + np.array(reflector.position)).astype(np.float32),
+        mesh.triangles,
+        normals if len(normals) else None,
+        mesh.uvs if len(mesh.uvs) else None,
+        mesh.parts if split else None,
+    )
+    return placed, list(names)
+
+
+def _stand_on_ground(positions: NDArray[np.float64], reflector: Reflector) -> NDArray[np.float64]:
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    if reflector.scale is not None:
+        scale = reflector.scale
+    elif high[1] - low[1] > 1e-6 * np.max(high - low):
+        scale = reflector.height / (high[1] - low[1])
+    else:
+        raise InputError(
+            f"{reflector.mesh}: the mesh is flat, so it cannot be scaled to reflector.height; "
+            "turn it with reflector.rotation or give reflector.scale"
+        )
+    base = np.array([0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])])
+    placed: NDArray[np.float64] = (positions - base) * scale
+    return placed
+
+
+def _material(config: MaterialConfig, scene: _core.Scene) -> int:
+    fresnel = _core.Fresnel(
+        model=getattr(_core.FresnelModel, config.fresnel),
+        r0=config.r0 or (0.9, 0.9, 0.9),
+        eta=config.eta or config.ior or (1.5, 1.5, 1.5),
+        k=config.k or (0.0, 0.0, 0.0),
+    )
+    texture = -1 if config.texture is None else scene.add_texture(_load_rgb(config.texture))
+    material = _core.Material(
+        name=REFLECTOR_NAME,
+        specular=True,
+        fresnel=fresnel,
+        albedo=config.albedo,
+        albedo_texture=texture,
+        layers=getattr(_core.LayerModel, config.layers),
+    )
+    return scene.add_material(material)
+
+
+def _load_rgb(path: str) -> FloatArray:
+    pixels, channels = _core.load_image(path)
+    if pixels.shape[2] == 1:
+        return np.repeat(pixels, 3, axis=2)
+    if pixels.shape[2] == 2 or list(channels[:3]) not in (["R", "G", "B"], ["r", "g", "b"]):
+        raise InputError(f"{path}: channels {', '.join(channels)}; expected R, G, B")
+    return np.ascontiguousarray(pixels[..., :3])
+
+
+def _panorama_scene(surroundings: Surroundings) -> _core.Scene:
+    assert surroundings.panorama is not None
+    scene = _core.Scene()
+    panorama = _load_rgb(surroundings.panorama)
+    bad = int(np.count_nonzero(~np.isfinite(panorama)))
+    if bad or float(panorama.min()) < 0.0:
+        bad += int(np.count_nonzero(panorama < 0.0))
+        raise InputError(
+            f"{surroundings.panorama}: {bad} values are negative or not finite; expected radiance ≥ 0"
+        )
+    scene.set_environment(panorama, surroundings.scale, surroundings.rotation)
+    if surroundings.ground is not None:
+        material = _core.Material(name="ground", albedo=surroundings.ground.albedo)
+        disc = _core.make_cylinder(
+            (0.0, -GROUND_THICKNESS, 0.0), surroundings.ground.radius, GROUND_THICKNESS, 96
+        )
+        scene.add_object("ground", disc, scene.add_material(material), [])
+    return scene
+
+
+def _resolve_arc(views: Views, positions: FloatArray) -> Arc:
+    low, high = positions.min(axis=0).astype(float), positions.max(axis=0).astype(float)
+    middle = 0.5 * (low + high)
+    centre = views.centre or (middle[0], middle[1], middle[2])
+    elevation = math.radians(DEFAULT_ELEVATION_DEGREES)
+    sphere = 0.5 * float(np.linalg.norm(high - low))
+    distance = sphere / (FRAME_FILL * math.sin(math.radians(0.5 * views.fov)))
+    radius = distance * math.cos(elevation) if views.radius is None else views.radius
+    height = radius * math.tan(elevation) if views.height is None else views.height
+    return Arc(
+        centre=(float(centre[0]), float(centre[1]), float(centre[2])),
+        radius=radius,
+        height=height,
+        start=views.start,
+        degrees=views.degrees,
+        fov=views.fov,
+        size=views.size,
+    )

@@ -1,0 +1,156 @@
+"""From a scene file to meshes, cameras and surroundings."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from mirrorbake import _core
+from mirrorbake.config import parse_config
+from mirrorbake.errors import InputError
+from mirrorbake.scene import Arc, build_scene, hash_inputs, rotation_matrix, winding_number
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# A 1 x 2 x 4 cuboid away from the origin, no normals, faces counter-clockwise from outside.
+CUBOID = """
+v 5 5 5
+v 6 5 5
+v 6 7 5
+v 5 7 5
+v 5 5 9
+v 6 5 9
+v 6 7 9
+v 5 7 9
+f 4 3 2 1
+f 5 6 7 8
+f 1 2 6 5
+f 3 4 8 7
+f 2 3 7 6
+f 4 1 5 8
+"""
+
+
+def build(**sections: Any) -> Any:
+    defaults = {"reflector": {"object": "teapot", "subdivisions": 3}, "views": {"count": 2}}
+    return build_scene(parse_config({**defaults, **sections}, "scene"))
+
+
+@pytest.fixture
+def cuboid(tmp_path: Path) -> str:
+    path = tmp_path / "cuboid.obj"
+    path.write_text(CUBOID)
+    return str(path)
+
+
+def test_rotations_turn_counter_clockwise_about_each_axis_in_turn() -> None:
+    x, y, z = np.eye(3)
+    np.testing.assert_allclose(rotation_matrix((90, 0, 0)) @ y, z, atol=1e-15)
+    np.testing.assert_allclose(rotation_matrix((0, 90, 0)) @ z, x, atol=1e-15)
+    np.testing.assert_allclose(rotation_matrix((0, 0, 90)) @ x, y, atol=1e-15)
+    # About x first: y goes to z, then about y to x.
+    np.testing.assert_allclose(rotation_matrix((90, 90, 0)) @ y, x, atol=1e-15)
+    # What the reference page promises for Z-up meshes.
+    np.testing.assert_allclose(rotation_matrix((-90, 0, 0)) @ z, y, atol=1e-15)
+
+
+def test_a_closed_mesh_winds_once_about_inner_points_and_not_about_outer_ones() -> None:
+    sphere = _core.make_sphere((1.0, 2.0, 3.0), 0.5, 32)
+    positions, triangles = np.asarray(sphere.positions), np.asarray(sphere.triangles)
+    random = np.random.default_rng(0)
+    for direction in random.normal(size=(20, 3)):
+        unit = direction / np.linalg.norm(direction)
+        inner, outer = np.array([1, 2, 3]) + 0.48 * unit, np.array([1, 2, 3]) + 0.51 * unit
+        # The mesh is float32 and its poles are slivers: 1e-4 is far from the threshold of 1/2.
+        assert winding_number(positions, triangles, inner) == pytest.approx(1.0, abs=1e-4)
+        assert winding_number(positions, triangles, outer) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_the_eye_walks_an_arc_about_the_vertical() -> None:
+    arc = Arc(centre=(1, 2, 3), radius=2, height=0.5, start=0, degrees=90, fov=30, size=(8, 4))
+    np.testing.assert_allclose(arc.eye(0), (1, 2.5, 5))
+    np.testing.assert_allclose(arc.eye(1), (3, 2.5, 3))
+    np.testing.assert_allclose(arc.eye(0.5), (1 + math.sqrt(2), 2.5, 3 + math.sqrt(2)))
+    camera = arc.camera(1)
+    np.testing.assert_allclose(camera.eye, (3, 2.5, 3))
+    np.testing.assert_allclose(camera.target, (1, 2, 3))
+    assert (camera.width, camera.height, camera.vertical_fov_degrees) == (8, 4, 30)
+
+
+def test_by_default_the_object_fills_the_frame_and_stays_inside() -> None:
+    built = build(views={"count": 2, "fov": 40, "size": [64, 64]})
+    for t in (0.0, 0.4, 1.0):
+        eye, target = np.array(built.arc.eye(t)), np.array(built.arc.centre)
+        forward = (target - eye) / np.linalg.norm(target - eye)
+        right = np.cross(forward, (0, 1, 0))
+        right /= np.linalg.norm(right)
+        up = np.cross(right, forward)
+        seen = built.positions - eye
+        depth = seen @ forward
+        edge = math.tan(math.radians(20))
+        across, along = np.abs(seen @ right / depth).max() / edge, np.abs(seen @ up / depth).max() / edge
+        assert 0.6 < max(across, along) < 1.0
+
+
+def test_a_mesh_is_scaled_to_its_height_and_set_on_the_ground(cuboid: str) -> None:
+    built = build(reflector={"mesh": cuboid, "height": 0.5, "position": [1, 2, 3]})
+    # A quarter of the file's size: 0.25 x 0.5 x 1, the base's centre at the position.
+    np.testing.assert_allclose(built.positions.min(axis=0), (0.875, 2.0, 2.5), atol=1e-6)
+    np.testing.assert_allclose(built.positions.max(axis=0), (1.125, 2.5, 3.5), atol=1e-6)
+    assert built.part_names == ["object"]
+
+
+def test_a_mesh_can_be_turned_and_scaled(cuboid: str) -> None:
+    built = build(reflector={"mesh": cuboid, "scale": 0.1, "rotation": [-90, 0, 0]})
+    np.testing.assert_allclose(built.positions.min(axis=0), (-0.05, 0.0, -0.1), atol=1e-6)
+    np.testing.assert_allclose(built.positions.max(axis=0), (0.05, 0.4, 0.1), atol=1e-6)
+    assert winding_number(built.positions, built.triangles, np.array([0, 0.2, 0])) == pytest.approx(1)
+
+
+def test_a_flat_mesh_has_no_height_to_scale_to(tmp_path: Path) -> None:
+    path = tmp_path / "flat.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 3 2\n")
+    with pytest.raises(InputError, match=r"flat\.obj: the mesh is flat"):
+        build(reflector={"mesh": str(path)})
+    built = build(reflector={"mesh": str(path), "scale": 0.1})
+    assert len(built.triangles) == 1
+
+
+def test_the_teapot_is_split_into_body_and_lid_or_joined() -> None:
+    split, joined = build(), build(reflector={"object": "teapot", "subdivisions": 3, "parts": "joined"})
+    assert split.part_names == ["body", "lid"]
+    assert set(split.parts) == {0, 1}
+    assert joined.part_names == ["teapot"]
+    assert set(joined.parts) == {0}
+    np.testing.assert_array_equal(split.positions, joined.positions)
+    assert split.positions[:, 1].min() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_view_inside_the_object_is_rejected(cuboid: str) -> None:
+    views = {"centre": [0, 0.5, 0], "radius": 0.1, "height": 0, "count": 3}
+    with pytest.raises(InputError, match=r"the eye at t = 0, .* lies inside the reflector"):
+        build(reflector={"mesh": cuboid, "scale": 1.0}, views=views)
+
+
+def test_input_files_are_known_by_their_content(cuboid: str, tmp_path: Path) -> None:
+    config = parse_config({"reflector": {"mesh": cuboid}}, "scene")
+    inputs = hash_inputs(config)
+    assert inputs.keys() == {"reflector.mesh"}
+    assert inputs["reflector.mesh"]["path"] == cuboid
+    missing = parse_config({"reflector": {"mesh": str(tmp_path / "nowhere.obj")}}, "scene")
+    with pytest.raises(InputError, match=r"nowhere\.obj: cannot read"):
+        hash_inputs(missing)
+
+
+def test_a_panorama_of_one_channel_is_grey_and_of_others_is_rejected(tmp_path: Path, cuboid: str) -> None:
+    grey, odd = tmp_path / "grey.exr", tmp_path / "odd.exr"
+    _core.save_image(str(grey), np.full((4, 8, 1), 0.5, np.float32), ["Y"])
+    _core.save_image(str(odd), np.full((4, 8, 3), 0.5, np.float32), ["X", "Y", "Z"])
+    built = build(surroundings={"panorama": str(grey), "ground": {"radius": 0.3}})
+    assert built.scene.object_names == ["ground", "reflector"]
+    with pytest.raises(InputError, match=r"odd\.exr: channels X, Y, Z; expected R, G, B"):
+        build(surroundings={"panorama": str(odd)})

@@ -1,0 +1,366 @@
+"""The command line as a user meets it: a process, its exit status, its two output streams and its files."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import zarr
+
+from mirrorbake import _core
+from mirrorbake.store import GROUP_NAME, PemStore
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+EXIT_USAGE, EXIT_INPUT = 2, 3
+
+SCENE = """
+[reflector]
+object = "teapot"
+subdivisions = 4
+[views]
+count = 3
+degrees = 4
+size = [40, 30]
+[maps]
+size = 16
+[trace]
+samples = 2
+indirect = "none"
+"""
+
+
+def run(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "mirrorbake", *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, check=False)
+
+
+def assert_one_error(result: subprocess.CompletedProcess[str], *words: str) -> None:
+    assert result.returncode == EXIT_INPUT, result.stderr
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    errors = [line for line in result.stderr.splitlines() if line.startswith("mirrorbake: error: ")]
+    assert len(errors) == 1, result.stderr
+    for word in words:
+        assert word in errors[0]
+
+
+def write_scene(folder: Path, text: str = SCENE) -> Path:
+    scene = folder / "scene.toml"
+    scene.write_text(text)
+    return scene
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished PEM; tests only read it."""
+    folder = tmp_path_factory.mktemp("baked")
+    result = run("bake", write_scene(folder), "--out", folder / "pem")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == ""
+    return folder / "pem"
+
+
+def read_maps(directory: Path) -> dict[str, np.ndarray]:
+    """Every array of a PEM but the timings, which differ between any two runs."""
+    group = zarr.open_group(directory / GROUP_NAME, mode="r")
+    arrays = {}
+
+    def collect(group: zarr.Group, path: str) -> None:
+        for name, member in group.members():
+            if isinstance(member, zarr.Array):
+                arrays[f"{path}/{name}"] = np.asarray(member[...])
+            else:
+                collect(member, f"{path}/{name}")
+
+    collect(group, "")
+    del arrays["/timings"]
+    return arrays
+
+
+def assert_same_bits(first: Path, second: Path) -> None:
+    a, b = read_maps(first), read_maps(second)
+    assert a.keys() == b.keys()
+    assert any("finest" in name for name in a)
+    for name, array in a.items():
+        assert array.tobytes() == b[name].tobytes(), name
+
+
+def test_version_is_the_librarys() -> None:
+    result = run("--version")
+    assert (result.returncode, result.stdout) == (0, f"mirrorbake {_core.version()}\n")
+
+
+@pytest.mark.parametrize("command", ["bake", "evaluate", "render", "demo"])
+def test_every_command_explains_itself(command: str) -> None:
+    result = run(command, "--help")
+    assert result.returncode == 0
+    assert "--threads" in result.stdout
+    assert result.stderr == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["fly"],
+        ["bake"],
+        ["bake", "scene.toml"],
+        ["bake", "scene.toml", "--out", "x", "--size", "512"],
+        ["bake", "scene.toml", "--out", "x", "--size", "-1x5"],
+        ["bake", "scene.toml", "--out", "x", "--views", "many"],
+        ["bake", "scene.toml", "--out", "x", "--set", "maps.size"],
+        ["bake", "scene.toml", "--out", "x", "--threads", "-1"],
+        ["bake", "scene.toml", "--out", "x", "--colour"],
+        ["evaluate"],
+        ["render", "dir", "--out", "a.png"],
+        ["render", "dir", "--view", "half", "--out", "a.png"],
+    ],
+)
+def test_wrong_usage_is_exit_2(tmp_path: Path, arguments: list[str]) -> None:
+    result = run(*arguments, cwd=tmp_path)
+    assert result.returncode == EXIT_USAGE
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--size", "0x30"], ["views.size.0 = 0", "greater than or equal to 1"]),
+        (["--size", "40x16385"], ["views.size.1 = 16385", "less than or equal to 16384"]),
+        (["--views", "0"], ["views.count = 0"]),
+        (["--spp", "0"], ["trace.samples = 0"]),
+        (["--spp", "65537"], ["trace.samples = 65537"]),
+        (["--em-size", "100"], ["maps.size = 100", "power of two"]),
+        (["--em-size", "8192"], ["maps.size = 8192"]),
+        (["--seed", "-1"], ["trace.seed = -1"]),
+        (["--set", "maps.sise=16"], ["maps.sise", "is not a key"]),
+        (["--set", "reflector.mesh=nowhere.obj"], ["nowhere.obj", "No such file"]),
+        (["--set", "surroundings.panorama=nowhere.exr"], ["nowhere.exr", "No such file"]),
+        (["--set", "material.texture=nowhere.png"], ["nowhere.png", "No such file"]),
+    ],
+)
+def test_a_value_out_of_range_is_one_clear_error(
+    tmp_path: Path, options: list[str], words: list[str]
+) -> None:
+    result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *options, cwd=tmp_path)
+    assert_one_error(result, *words)
+    assert not (tmp_path / "pem").exists()
+
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", []),
+        (b"\x00\xff\x17 not a mesh", []),
+        (TRIANGLE.encode() + b"f 1 2 9\n", []),
+        (TRIANGLE.replace("1 0 0", "nan 0 0").encode() + b"f 1 2 3\n", []),
+        (TRIANGLE.replace("1 0 0", "inf 0 0").encode() + b"f 1 2 3\n", []),
+        (b"v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", []),
+    ],
+    ids=["empty", "binary", "index", "nan", "inf", "zero-area"],
+)
+def test_an_unusable_mesh_is_one_clear_error(tmp_path: Path, content: bytes, words: list[str]) -> None:
+    mesh = tmp_path / "broken.obj"
+    mesh.write_bytes(content)
+    scene = write_scene(tmp_path)
+    result = run("bake", scene, "--out", tmp_path / "pem", "--set", f"reflector.mesh={mesh}")
+    assert_one_error(result, "broken.obj", *words)
+    assert not (tmp_path / "pem").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"not an image", b"\x76\x2f\x31\x01\x02\x00\x00\x00" + b"\xff" *
+64]) def test_a_panorama_that_is_corrupt_is_one_clear_error(tmp_path: Path, content: bytes) -> None:
+    panorama = tmp_path / "broken.exr"
+    panorama.write_bytes(content)
+    scene = write_scene(tmp_path)
+    result = run("bake", scene, "--out", tmp_path / "pem", "--set", f"surroundings.panorama={panorama}")
+    assert_one_error(result, "broken.exr")
+    assert not (tmp_path / "pem").exists()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
+def test_a_panorama_with_impossible_radiance_is_one_clear_error(tmp_path: Path, value: float) -> None:
+    pixels = np.ones((4, 8, 3), np.float32)
+    pixels[1, 2, 0] = value
+    panorama = tmp_path / "sky.exr"
+    _core.save_image(str(panorama), pixels, ["R", "G", "B"], "float32")
+    scene = write_scene(tmp_path)
+    result = run("bake", scene, "--out", tmp_path / "pem", "--set", f"surroundings.panorama={panorama}")
+    assert_one_error(result, "sky.exr", "1 values are negative or not finite")
+    assert not (tmp_path / "pem").exists()
+
+
+def test_a_view_inside_the_object_is_one_clear_error(tmp_path: Path) -> None:
+    options = ["views.radius=0.001", "views.height=0", "views.centre=[0,0.06,0]"]
+    sets = [argument for option in options for argument in ("--set", option)]
+    result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *sets)
+    assert_one_error(result, "the eye at t = 0", "lies inside the reflector")
+    assert not (tmp_path / "pem").exists()
+
+
+def test_an_output_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path)
+    (tmp_path / "file").write_text("mine")
+    assert_one_error(run("bake", scene, "--out", tmp_path / "file"), "is a file")
+    assert_one_error(run("bake", scene, "--out", tmp_path / "file" / "pem"), "cannot write")
+    assert (tmp_path / "file").read_text() == "mine"
+    assert_one_error(run("bake", scene, "--out", "/proc/pem"), "/proc/pem", "cannot write")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_an_output_without_permission_is_one_clear_error(tmp_path: Path) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o500)
+    assert_one_error(run("bake", write_scene(tmp_path), "--out", locked / "pem"), "Permission denied")
+
+
+def test_a_folder_of_other_things_is_left_alone(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path)
+    result = run("bake", scene, "--out", tmp_path)
+    assert_one_error(result, "is not empty and holds no PEM")
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+
+
+def test_a_pem_of_another_scene_is_left_alone(baked: Path, tmp_path: Path) -> None:
+    before = read_maps(baked)
+    result = run("bake", write_scene(tmp_path), "--out", baked, "--em-size", "32")
+    assert_one_error(result, "holds a PEM of another scene", "maps.size = 16 instead of 32")
+    after = read_maps(baked)
+    assert all(np.array_equal(before[name], after[name]) for name in before)
+
+
+def test_a_finished_bake_is_not_done_again(baked: Path, tmp_path: Path) -> None:
+    mark = baked / GROUP_NAME / "complete" / "c" / "2"
+    before = mark.stat().st_mtime_ns
+    result = run("bake", write_scene(tmp_path), "--out", baked)
+    assert result.returncode == 0
+    assert "3 views, 3 of them from an earlier run" in result.stderr
+    assert mark.stat().st_mtime_ns == before
+
+
+def test_a_bake_that_is_killed_is_resumed_to_the_same_bits(baked: Path, tmp_path: Path) -> None:
+    scene, out = write_scene(tmp_path), tmp_path / "pem"
+    command = [sys.executable, "-m", "mirrorbake", "bake", str(scene), "--out", str(out)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    mark = out / GROUP_NAME / "complete" / "c" / "0"
+    deadline = time.monotonic() + 120
+    while not mark.exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.001)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    done = int(PemStore.open(out).completed().sum())
+    assert 1 <= done < 3
+    for command_name in ("evaluate", "render"):
+        extra = [] if command_name == "evaluate" else ["--view", "0", "--out", str(tmp_path / "a.png")]
+        assert_one_error(run(command_name, out, *extra), f"only {done} of 3 views are baked")
+    assert not (tmp_path / "a.png").exists()
+    result = run("bake", scene, "--out", out)
+    assert result.returncode == 0, result.stderr
+    assert f"3 views, {done} of them from an earlier run" in result.stderr
+    assert_same_bits(out, baked)
+    assert not list(out.rglob("*.partial"))
+
+
+def test_one_and_two_threads_bake_the_same_bits(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path)
+    for threads in (1, 2):
+        result = run("bake", scene, "--out", tmp_path / str(threads), "--threads", str(threads))
+        assert result.returncode == 0, result.stderr
+    assert_same_bits(tmp_path / "1", tmp_path / "2")
+
+
+def test_another_seed_bakes_other_bits(baked: Path, tmp_path: Path) -> None:
+    result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", "--seed", "1")
+    assert result.returncode == 0, result.stderr
+    ours, theirs = read_maps(tmp_path / "pem"), read_maps(baked)
+    assert not np.array_equal(ours["/maps/body/distant/finest"], theirs["/maps/body/distant/finest"])
+
+
+def test_options_override_the_scene_file(tmp_path: Path) -> None:
+    options = ["--views", "2", "--size", "24x16", "--spp", "1", "--em-size", "8"]
+    result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *options)
+    assert result.returncode == 0, result.stderr
+    header = PemStore.open(tmp_path / "pem").header
+    assert (header.parameters, header.image_size, header.map_size) == ([0.0, 1.0], (24, 16), 8)
+    assert header.source.config["trace"]["samples"] == 1
+
+
+def test_evaluate_writes_the_figures_it_prints(baked: Path) -> None:
+    result = run("evaluate", baked, "--json")
+    assert result.returncode == 0, result.stderr
+    printed: dict[str, Any] = json.loads(result.stdout)
+    written = json.loads((baked / "metrics.json").read_text())
+    assert printed == written
+    views = written["views"]
+    assert [view["t"] for view in views] == [0, 0.25, 0.5, 0.75, 1]
+    assert [view["sampled"] for view in views] == [True, False, True, False, True]
+    for view in views:
+        assert view["psnr"].keys() == {"pem", "static_infinite", "static_box"}
+        assert all(5 < value < 80 for value in view["psnr"].values())
+        assert view["trace_s"] > 0
+        assert (view["build_s"] is None) == (view["solve_s"] is None) == (not view["sampled"])
+    table = run("evaluate", baked)
+    assert table.returncode == 0
+    assert "PEM" in table.stdout
+    assert f"{views[0]['psnr']['pem']:.2f}" in table.stdout
+
+
+@pytest.mark.parametrize("name", ["view.exr", "view.png"])
+def test_render_writes_a_picture_of_any_view(baked: Path, tmp_path: Path, name: str) -> None:
+    picture = tmp_path / name
+    result = run("render", baked, "--view", "0.3", "--out", picture)
+    assert result.returncode == 0, result.stderr
+    pixels, channels = _core.load_image(str(picture))
+    assert pixels.shape == (30, 40, 3)
+    assert list(channels) == ["R", "G", "B"]
+    assert np.isfinite(pixels).all()
+    assert pixels.std() > 0.01
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize(
+    ("view", "name", "words"),
+    [
+        ("-0.1", "a.png", ["view = -0.1", "from 0 to 1"]),
+        ("1.01", "a.png", ["view = 1.01"]),
+        ("nan", "a.png", ["view = nan"]),
+        ("0.5", "a.gif", ["a.gif", "expected a name that ends in .exr or .png"]),
+        ("0.5", "missing/a.png", ["missing/a.png", "cannot write"]),
+    ],
+)
+def test_render_rejects_what_it_cannot_do(
+    baked: Path, tmp_path: Path, view: str, name: str, words: list[str]
+) -> None:
+    result = run("render", baked, f"--view={view}", "--out", tmp_path / name)
+    assert_one_error(result, *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_without_a_pem_is_one_clear_error(tmp_path: Path) -> None:
+    assert_one_error(run("evaluate", tmp_path), "holds no PEM")
+    assert_one_error(run("evaluate", tmp_path / "nowhere"), "holds no PEM")
+
+
+def test_inputs_that_changed_since_the_bake_are_one_clear_error(tmp_path: Path) -> None:
+    sky = tmp_path / "sky.exr"
+    _core.save_image(str(sky), np.full((4, 8, 3), 0.5, np.float32), ["R", "G", "B"])
+    options = ["--set", f"surroundings.panorama={sky}", "--views", "1"]
+    result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *options)
+    assert result.returncode == 0, result.stderr
+    _core.save_image(str(sky), np.full((4, 8, 3), 0.6, np.float32), ["R", "G", "B"])
+    assert_one_error(run("evaluate", tmp_path / "pem"), "its scene has changed", "surroundings.panorama")
+    sky.unlink()
+    assert_one_error(run("evaluate", tmp_path / "pem"), "sky.exr", "cannot read")

@@ -4,12 +4,12 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <cstdint>
 #include <numbers>
 #include <optional>
 #include <sstream>
 #include <string_view>
 
+#include "fresnel_batch.hpp"
 #include "fresnel_formulas.hpp"
 #include "fresnel_kernels.hpp"
 #include "mirrorbake/core/error.hpp"
@@ -22,18 +22,14 @@ using baseline::clamp_cosine;
 using baseline::make_medium;
 using baseline::Medium;
 
-// Elements per task: some ten microseconds of work, against about one to hand it out.
-constexpr std::size_t kGrain = std::size_t{1} << 15;
-
+// The polynomials for a conductor cost some microseconds to set up.
 constexpr std::size_t kLeastForSeries = 4096;
 
 // Below this, k changes nothing a double can show, and its square would underflow.
 constexpr double kLeastK = 1e-100;
 
 // Where float forms keep the promise of the header (fresnel_formulas.hpp says why).
-bool dielectric_fits_float(float ior) {
-  return ior >= 1.05F && ior <= 1e9F;
-}
+bool dielectric_fits_float(float ior) { return ior >= 1.05F && ior <= 1e9F; }
 
 bool conductor_fits_float(const Medium& medium, float eta, float k) {
   const double n = eta;
@@ -104,9 +100,7 @@ std::optional<ConductorSeries> conductor_series(const Medium& medium) {
   return series;
 }
 
-MediumConstants constants_of(const Medium& medium) {
-  return {medium.a.high, medium.a.low, medium.nk};
-}
+MediumConstants constants_of(const Medium& medium) { return {medium.a.high, medium.a.low, medium.nk}; }
 
 [[noreturn]] void reject(std::string_view name, double value, std::string_view expected) {
   std::ostringstream text;
@@ -132,44 +126,22 @@ void check(const Range& range, double value) {
   if (!(value >= low && value <= range.high)) reject(range.name, value, range.expected);
 }
 
-template <typename T>
-void check_input(std::string_view name, std::span<const T> input, std::span<T> f) {
-  if (input.size() != f.size()) {
-    throw InvalidArgument(name, std::to_string(input.size()) + " elements",
-                          "as many as the output: " + std::to_string(f.size()));
-  }
-  const auto in = reinterpret_cast<std::uintptr_t>(input.data());
-  const auto out = reinterpret_cast<std::uintptr_t>(f.data());
-  const std::size_t bytes = input.size_bytes();
-  if (bytes != 0 && in < out + bytes && out < in + bytes) {
-    throw InvalidArgument("f", "an array that overlaps an input", "separate memory");
-  }
-}
-
 }  // namespace
 
 const FresnelKernels& fresnel_kernels() {
 #ifdef MIRRORBAKE_HAS_X86_LEVELS
   switch (active_isa()) {
-    case Isa::avx512:
-      return avx512::kFresnelKernels;
-    case Isa::avx2:
-      return avx2::kFresnelKernels;
-    case Isa::sse42:
-      return sse42::kFresnelKernels;
-    case Isa::baseline:
-      break;
+    case Isa::avx512: return avx512::kFresnelKernels;
+    case Isa::avx2: return avx2::kFresnelKernels;
+    case Isa::sse42: return sse42::kFresnelKernels;
+    case Isa::baseline: break;
   }
 #endif
   return baseline::kFresnelKernels;
 }
 
-float fresnel_schlick(float c, float r0) {
-  return baseline::schlick(clamp_cosine(c), r0);
-}
-double fresnel_schlick(double c, double r0) {
-  return baseline::schlick(clamp_cosine(c), r0);
-}
+float fresnel_schlick(float c, float r0) { return baseline::schlick(clamp_cosine(c), r0); }
+double fresnel_schlick(double c, double r0) { return baseline::schlick(clamp_cosine(c), r0); }
 
 float fresnel_dielectric(float c, float ior) {
   const float cosine = clamp_cosine(c);
@@ -210,24 +182,6 @@ double fresnel_conductor(double c, double eta, double k) {
 
 namespace {
 
-/// Runs `kernel(c, parameters…, f, count)` over chunks; every parameter is one value for the whole array.
-template <typename T, typename Kernel, typename... Parameters>
-void map(std::span<const T> c, std::span<T> f, Kernel kernel, Parameters... parameters) {
-  check_input("c", c, f);
-  parallel_for(c.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    kernel(c.data() + begin, parameters..., f.data() + begin, end - begin);
-  });
-}
-
-/// The same with parameters that are arrays too.
-template <typename T, typename Kernel, typename... Parameters>
-void map_each(std::span<const T> c, std::span<T> f, Kernel kernel, Parameters... parameters) {
-  check_input("c", c, f);
-  parallel_for(c.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    kernel(c.data() + begin, (parameters.data() + begin)..., f.data() + begin, end - begin);
-  });
-}
-
 template <typename T>
 void check_each(const Range& range, std::span<const T> values, std::span<T> f) {
   check_input(range.name, values, f);
@@ -238,27 +192,27 @@ void check_each(const Range& range, std::span<const T> values, std::span<T> f) {
 
 void fresnel_schlick(std::span<const float> c, float r0, std::span<float> f) {
   check(kR0, static_cast<double>(r0));
-  map(c, f, fresnel_kernels().schlick_f32, r0);
+  map_cosines(c, f, fresnel_kernels().schlick_f32, r0);
 }
 
 void fresnel_schlick(std::span<const double> c, double r0, std::span<double> f) {
   check(kR0, r0);
-  map(c, f, fresnel_kernels().schlick_f64, r0);
+  map_cosines(c, f, fresnel_kernels().schlick_f64, r0);
 }
 
 void fresnel_dielectric(std::span<const float> c, float ior, std::span<float> f) {
   check(kIor, static_cast<double>(ior));
   const Medium medium = make_medium(static_cast<double>(ior), 0.0);
   if (dielectric_fits_float(ior)) {
-    map(c, f, fresnel_kernels().dielectric_f32, static_cast<float>(medium.a.high));
+    map_cosines(c, f, fresnel_kernels().dielectric_f32, static_cast<float>(medium.a.high));
   } else {
-    map(c, f, fresnel_kernels().dielectric_f32_in_double, constants_of(medium));
+    map_cosines(c, f, fresnel_kernels().dielectric_f32_in_double, constants_of(medium));
   }
 }
 
 void fresnel_dielectric(std::span<const double> c, double ior, std::span<double> f) {
   check(kIor, ior);
-  map(c, f, fresnel_kernels().dielectric_f64, constants_of(make_medium(ior, 0.0)));
+  map_cosines(c, f, fresnel_kernels().dielectric_f64, constants_of(make_medium(ior, 0.0)));
 }
 
 void fresnel_conductor(std::span<const float> c, float eta, float k, std::span<float> f) {
@@ -267,13 +221,12 @@ void fresnel_conductor(std::span<const float> c, float eta, float k, std::span<f
   if (k == 0.0F) return fresnel_dielectric(c, eta, f);
   const Medium medium = make_medium(static_cast<double>(eta), static_cast<double>(k));
   if (conductor_fits_float(medium, eta, k)) {
-    // The polynomials cost some microseconds to set up.
     const auto series = c.size() >= kLeastForSeries ? conductor_series(medium) : std::nullopt;
-    if (series) return map(c, f, fresnel_kernels().conductor_series_f32, *series);
-    map(c, f, fresnel_kernels().conductor_f32, static_cast<float>(medium.a.high),
-        static_cast<float>(medium.nk));
+    if (series) return map_cosines(c, f, fresnel_kernels().conductor_series_f32, *series);
+    map_cosines(c, f, fresnel_kernels().conductor_f32, static_cast<float>(medium.a.high),
+                static_cast<float>(medium.nk));
   } else {
-    map(c, f, fresnel_kernels().conductor_f32_in_double, constants_of(medium));
+    map_cosines(c, f, fresnel_kernels().conductor_f32_in_double, constants_of(medium));
   }
 }
 
@@ -281,59 +234,51 @@ void fresnel_conductor(std::span<const double> c, double eta, double k, std::spa
   check(kEta, eta);
   check(kK, k);
   if (k < kLeastK) return fresnel_dielectric(c, eta, f);
-  map(c, f, fresnel_kernels().conductor_f64, constants_of(make_medium(eta, k)));
+  map_cosines(c, f, fresnel_kernels().conductor_f64, constants_of(make_medium(eta, k)));
 }
 
 void fresnel_schlick(std::span<const float> c, std::span<const float> r0, std::span<float> f) {
   check_each(kR0, r0, f);
-  map_each(c, f, fresnel_kernels().schlick_each_f32, r0);
+  map_cosines_each(c, f, fresnel_kernels().schlick_each_f32, r0);
 }
 
 void fresnel_schlick(std::span<const double> c, std::span<const double> r0, std::span<double> f) {
   check_each(kR0, r0, f);
-  map_each(c, f, fresnel_kernels().schlick_each_f64, r0);
+  map_cosines_each(c, f, fresnel_kernels().schlick_each_f64, r0);
 }
 
 void fresnel_dielectric(std::span<const float> c, std::span<const float> ior, std::span<float> f) {
   check_each(kIor, ior, f);
-  map_each(c, f, fresnel_kernels().dielectric_each_f32, ior);
+  map_cosines_each(c, f, fresnel_kernels().dielectric_each_f32, ior);
 }
 
 void fresnel_dielectric(std::span<const double> c, std::span<const double> ior, std::span<double> f) {
   check_each(kIor, ior, f);
-  map_each(c, f, fresnel_kernels().dielectric_each_f64, ior);
+  map_cosines_each(c, f, fresnel_kernels().dielectric_each_f64, ior);
 }
 
 void fresnel_conductor(std::span<const float> c, std::span<const float> eta, std::span<const float> k,
                        std::span<float> f) {
   check_each(kEta, eta, f);
   check_each(kK, k, f);
-  map_each(c, f, fresnel_kernels().conductor_each_f32, eta, k);
+  map_cosines_each(c, f, fresnel_kernels().conductor_each_f32, eta, k);
 }
 
 void fresnel_conductor(std::span<const double> c, std::span<const double> eta, std::span<const double> k,
                        std::span<double> f) {
   check_each(kEta, eta, f);
   check_each(kK, k, f);
-  map_each(c, f, fresnel_kernels().conductor_each_f64, eta, k);
+  map_cosines_each(c, f, fresnel_kernels().conductor_each_f64, eta, k);
 }
 
 glm::vec3 evaluate(const Fresnel& fresnel, float c) {
   glm::vec3 f(0.0F);
   for (int i = 0; i < 3; ++i) {
     switch (fresnel.model) {
-      case FresnelModel::constant:
-        f[i] = fresnel.r0[i];
-        break;
-      case FresnelModel::schlick:
-        f[i] = fresnel_schlick(c, fresnel.r0[i]);
-        break;
-      case FresnelModel::dielectric:
-        f[i] = fresnel_dielectric(c, fresnel.eta[i]);
-        break;
-      case FresnelModel::conductor:
-        f[i] = fresnel_conductor(c, fresnel.eta[i], fresnel.k[i]);
-        break;
+      case FresnelModel::constant: f[i] = fresnel.r0[i]; break;
+      case FresnelModel::schlick: f[i] = fresnel_schlick(c, fresnel.r0[i]); break;
+      case FresnelModel::dielectric: f[i] = fresnel_dielectric(c, fresnel.eta[i]); break;
+      case FresnelModel::conductor: f[i] = fresnel_conductor(c, fresnel.eta[i], fresnel.k[i]); break;
     }
   }
   return f;
@@ -345,22 +290,16 @@ void evaluate(const Fresnel& fresnel, std::span<const float> c, std::span<glm::v
                           "as many as the output: " + std::to_string(f.size()));
   }
   constexpr std::size_t kBlock = 1024;  // a block of one channel stays in the first-level cache
-  parallel_for(c.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(c.size(), kFresnelGrain, [&](std::size_t begin, std::size_t end) {
     std::array<float, kBlock> channel;
     for (std::size_t first = begin; first < end; first += kBlock) {
       const auto cosines = c.subspan(first, std::min(kBlock, end - first));
       const std::span<float> values(channel.data(), cosines.size());
       for (int i = 0; i < 3; ++i) {
         switch (fresnel.model) {
-          case FresnelModel::constant:
-            std::fill(values.begin(), values.end(), fresnel.r0[i]);
-            break;
-          case FresnelModel::schlick:
-            fresnel_schlick(cosines, fresnel.r0[i], values);
-            break;
-          case FresnelModel::dielectric:
-            fresnel_dielectric(cosines, fresnel.eta[i], values);
-            break;
+          case FresnelModel::constant: std::fill(values.begin(), values.end(), fresnel.r0[i]); break;
+          case FresnelModel::schlick: fresnel_schlick(cosines, fresnel.r0[i], values); break;
+          case FresnelModel::dielectric: fresnel_dielectric(cosines, fresnel.eta[i], values); break;
           case FresnelModel::conductor:
             fresnel_conductor(cosines, fresnel.eta[i], fresnel.k[i], values);
             break;

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <glm/vec3.hpp>
 #include <span>
+#include <glm/vec3.hpp>
 
 /// Fresnel reflectance of smooth surfaces, unpolarised. In every function `c` is the cosine n·v on the side
 /// the light comes from. It is clamped to [0,1] and may be anything; a NaN gives NaN. The answer is in [0,1].

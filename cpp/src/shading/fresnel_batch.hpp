@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+
+/// What the functions of arrays share: checks, and chunks on several threads.
+namespace mirrorbake {
+
+// Elements per task: some ten microseconds of work, against about one to hand it out.
+constexpr std::size_t kFresnelGrain = std::size_t{1} << 15;
+
+template <typename T>
+void check_input(std::string_view name, std::span<const T> input, std::span<T> f) {
+  if (input.size() != f.size()) {
+    throw InvalidArgument(name, std::to_string(input.size()) + " elements",
+                          "as many as the output: " + std::to_string(f.size()));
+  }
+  const auto in = reinterpret_cast<std::uintptr_t>(input.data());
+  const auto out = reinterpret_cast<std::uintptr_t>(f.data());
+  const std::size_t bytes = input.size_bytes();
+  if (bytes != 0 && in < out + bytes && out < in + bytes) {
+    throw InvalidArgument("f", "an array that overlaps an input", "separate memory");
+  }
+}
+
+/// Runs `kernel(c, parameters…, f, count)` over chunks; every parameter is one value for the whole array.
+template <typename T, typename Kernel, typename... Parameters>
+void map_cosines(std::span<const T> c, std::span<T> f, Kernel kernel, Parameters... parameters) {
+  check_input("c", c, f);
+  parallel_for(c.size(), kFresnelGrain, [&](std::size_t begin, std::size_t end) {
+    kernel(c.data() + begin, parameters..., f.data() + begin, end - begin);
+  });
+}
+
+/// The same with parameters that are arrays too.
+template <typename T, typename Kernel, typename... Parameters>
+void map_cosines_each(std::span<const T> c, std::span<T> f, Kernel kernel, Parameters... parameters) {
+  check_input("c", c, f);
+  parallel_for(c.size(), kFresnelGrain, [&](std::size_t begin, std::size_t end) {
+    kernel(c.data() + begin, (parameters.data() + begin)..., f.data() + begin, end - begin);
+  });
+}
+
+}  // namespace mirrorbake

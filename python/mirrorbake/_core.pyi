@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 import enum
-from typing import Annotated
+from typing import Annotated, overload
 
 import numpy
 import numpy.typing
@@ -1099,3 +1099,85 @@ def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArra
     """
     Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex (V, 3).
     """
+
+@overload
+def fresnel_schlick(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], r0: float, f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_schlick(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], r0: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_schlick(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], r0: float, f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_schlick(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], r0: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_dielectric(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], ior: float, f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_dielectric(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], ior: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_dielectric(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], ior: float, f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_dielectric(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], ior: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_conductor(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], eta: float, k: float, f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_conductor(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], eta: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], k: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_conductor(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], eta: float, k: float, f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+@overload
+def fresnel_conductor(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], eta: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], k: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+def fresnel_dielectric_transmittance(c: float, ior: float) -> float:
+    """1 − F without cancellation."""
+
+class FresnelTable:
+    """Reflectance at equal steps of the cosine, interpolated linearly."""
+
+    @property
+    def values(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """float32 (size,): reflectance at c = 0, 1/(size − 1), …, 1."""
+
+    @property
+    def max_error(self) -> float:
+        """Largest deviation from the exact curve."""
+
+    @overload
+    def evaluate(self, c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+
+    @overload
+    def evaluate(self, c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None:
+        """Fills `f` with interpolated reflectance."""
+
+def make_fresnel_table(model: FresnelModel, first: float, k: float, size: int) -> FresnelTable:
+    """
+    first: r0, relative index or eta, as the model has it; k for conductors.
+    """
+
+def fresnel_table_for_error(model: FresnelModel, first: float, k: float, max_error: float) -> FresnelTable: ...
+
+def metal_names() -> list[str]:
+    """Names of the metals with measured optical constants."""
+
+def metal_source(metal: str) -> str:
+    """Publication of the metal's optical constants."""
+
+def metal_optical_constants(metal: str) -> NDArray[numpy.float64]:
+    """float64 (n, 3): wavelength in nm, eta, k."""
+
+def metal_reflectance(metal: str, c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], illuminant: str) -> NDArray[numpy.float64]:
+    """float64 (n, 3): linear Rec.709."""
+
+def fit_metal(metal: str, illuminant: str) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
+    """(r0, its error, eta, k, their error), each per channel."""
+
+def active_isa() -> str:
+    """Instruction set in use: 'baseline', 'sse42', 'avx2' or 'avx512'."""

@@ -112,10 +112,10 @@ inline double plus_square(Double2 a, double c) {
 inline double dielectric_any(double c, Double2 a) {
   const double g2 = plus_square(a, c);
   const double g = std::sqrt(0.0 < g2 ? g2 : 0.0);
-  const double s = g + c;
   const double q = (1.0 - c) * (1.0 + c);
   const double cg = c * g;
-  const double denominator = s * s * (cg + q);
+  const double s2 = g2 + (c * c + 2.0 * cg);  // s², and exactly k at c = 0
+  const double denominator = s2 * (cg + q);
   const double h = (a.high + a.low) / denominator;
   const double f = at_most_one(h * h * (cg * cg + q * q));
   const double answered = denominator == 0.0 ? 0.0 : f;
@@ -124,11 +124,11 @@ inline double dielectric_any(double c, Double2 a) {
 
 /// 1 − F without the subtraction: T = 2cg/s² · (1 + n²/(cg + q)²).
 inline double dielectric_transmittance(double c, double n) {
+  if (n == 1.0) return 1.0;
   const double g2 = plus_square(make_medium(n, 0.0).a, c);
-  if (g2 < 0.0) return 0.0;
+  if (g2 <= 0.0) return 0.0;
   const double g = std::sqrt(g2);
   const double s = g + c;
-  if (s == 0.0) return 1.0;  // n = 1, c = 0
   const double q = (1.0 - c) * (1.0 + c);
   const double ratio = n / (c * g + q);
   return at_most_one(2.0 * (c / s) * (g / s) * (1.0 + ratio * ratio));

@@ -181,8 +181,11 @@ def test_an_unusable_mesh_is_one_clear_error(tmp_path: Path, content: bytes, wor
     assert not (tmp_path / "pem").exists()
 
 
-@pytest.mark.parametrize("content", [b"", b"not an image", b"\x76\x2f\x31\x01\x02\x00\x00\x00" + b"\xff" *
-64]) def test_a_panorama_that_is_corrupt_is_one_clear_error(tmp_path: Path, content: bytes) -> None:
+EXR_MAGIC = b"\x76\x2f\x31\x01\x02\x00\x00\x00"
+
+
+@pytest.mark.parametrize("content", [b"", b"not an image", EXR_MAGIC + b"\xff" * 64])
+def test_a_panorama_that_is_corrupt_is_one_clear_error(tmp_path: Path, content: bytes) -> None:
     panorama = tmp_path / "broken.exr"
     panorama.write_bytes(content)
     scene = write_scene(tmp_path)

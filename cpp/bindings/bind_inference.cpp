@@ -164,6 +164,7 @@ void bind_inference(nb::module_& m) {
 
   nb::class_<SolveReport>(m, "SolveReport", "What a solve did.")
       .def_ro("iterations", &SolveReport::iterations)
+      .def_ro("rounds", &SolveReport::rounds, "Of the active set that keeps the map within its bounds.")
       .def_ro("relative_gradient", &SolveReport::relative_gradient, "What `tolerance` is compared with.")
       .def_ro("unknowns", &SolveReport::unknowns, "Texels that some row sees.")
       .def_ro("rms_error", &SolveReport::rms_error, "Weighted root mean square of A x - b.");
@@ -200,7 +201,7 @@ void bind_inference(nb::module_& m) {
                   "tuple[numpy.typing.NDArray[numpy.float32], SolveReport]"),
           "Solves for a map.\n\ntarget: float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior, "
           "initial: float32 "
-          "(texels, C). Returns the map, float32 (texels, C), clamped to [0, inf) (coverage to [0, 1]), and "
+          "(texels, C). Returns the map, float32 (texels, C), within [0, inf) (coverage in [0, 1]), and "
           "a report.");
 }
 

@@ -1,8 +1,10 @@
 #include "mirrorbake/inference/map_solver.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -17,6 +19,7 @@ namespace {
 
 using Vector = std::vector<Channels>;
 constexpr std::size_t kRowGrain = 2048;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 void check_finite(const char* name, std::span<const float> values) {
   const auto bad = std::count_if(values.begin(), values.end(), [](float v) { return !std::isfinite(v); });
@@ -71,6 +74,42 @@ std::vector<float> display_row_weights(const RenderingMatrix& matrix, int sample
   return weights;
 }
 
+namespace {
+
+constexpr int kMaxRounds = 8;
+
+// Of every unknown; the unknowns may be differences from a prior.
+struct Bounds {
+  Vector lower, upper;
+};
+
+// Puts what is out of bounds on its bound and holds it there; frees what is held and wants inside, going by half the negative
+// gradient s. Returns whether there was anything to hold or free: only then another round can change the solution.
+bool hold_to(const Bounds& bounds, const Vector& s, Vector& x, Vector& free) {
+  std::atomic<bool> changed = false;
+  parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        const bool below = x[i][k] < bounds.lower[i][k];
+        const bool above = x[i][k] > bounds.upper[i][k];
+        if (below || above) {
+          x[i][k] = below ? bounds.lower[i][k] : bounds.upper[i][k];
+          free[i][k] = 0.0F;
+          changed = true;
+        } else if (free[i][k] == 0.0F) {
+          const bool inwards = x[i][k] <= bounds.lower[i][k] ? s[i][k] > 0.0F : s[i][k] < 0.0F;
+          if (!inwards) continue;
+          free[i][k] = 1.0F;
+          changed = true;
+        }
+      }
+    }
+  });
+  return changed;
+}
+
+}  // namespace
+
 struct MapSolver::State {
   CubePyramidLayout layout;
   SolveOptions options;
@@ -103,25 +142,26 @@ struct MapSolver::State {
     });
   }
 
-  // s = AᵀW t − g, z = s / diagonal. Returns s·z.
-  ChannelSums preconditioned_gradient(float magnitude, const Vector& t, const Vector& g, Vector& z) const {
+  // s = AᵀW t − g, half the negative gradient; z = s / diagonal where free is 1, else 0. Returns s·z.
+  ChannelSums preconditioned_gradient(float magnitude, const Vector& free, const Vector& t, const Vector& g,
+                                      Vector& s, Vector& z) const {
     return parallel_channel_sums(unknowns(), [&](std::size_t begin, std::size_t end) {
       ChannelSums sums{};
       for (std::size_t i = begin; i < end; ++i) {
-        Channels s = -g[i];
+        s[i] = -g[i];
         for (std::uint64_t e = column_offsets[i]; e < column_offsets[i + 1]; ++e) {
-          s += broadcast(weighted[e]) * t[rows[e]];
+          s[i] += broadcast(weighted[e]) * t[rows[e]];
         }
         const float diagonal = data_diagonal[i] + regulariser.diagonal(i) + magnitude;
-        z[i] = diagonal > 0.0F ? s / broadcast(diagonal) : Channels{};
-        add_product(sums, s, z[i]);
+        z[i] = diagonal > 0.0F ? free[i] * s[i] / broadcast(diagonal) : Channels{};
+        add_product(sums, s[i], z[i]);
       }
       return sums;
     });
   }
 
-  // Minimises Σ w |A x − target|² + regulariser + magnitude |x|², starting from x.
-  SolveReport conjugate_gradients(const Vector& target, float magnitude, Vector& x) const;
+  // Minimises Σ w |A x − target|² + regulariser + magnitude |x|² over lower ≤ x ≤ upper, starting from x.
+  SolveReport minimise(const Vector& target, float magnitude, const Bounds& bounds, Vector& x) const;
 };
 
 namespace {
@@ -208,20 +248,20 @@ MapSolver& MapSolver::operator=(MapSolver&&) noexcept = default;
 // CGLS (Björck, Numerical Methods for Least Squares Problems, 1996, §7.4): the residual t = b − A x is carried along
 // instead of AᵀA's, so that rounding grows with the condition number of A, not its square. G x of the regulariser is
 // carried along likewise. All channels step together, each with its own step lengths.
-SolveReport MapSolver::State::conjugate_gradients(const Vector& target, float magnitude, Vector& x) const {
+//
+// The bounds are an active set around it (op. cit., §5.2): texels that a round of conjugate gradients drives out of
+// bounds are put on their bound and held there, held ones that the gradient pulls inside are set free, and the next round
+// goes on from there. Clamping the unbounded solution instead would be far from the best map: where the data leave a
+// combination of texels undetermined, large positive and negative ones cancel each other.
+SolveReport MapSolver::State::minimise(const Vector& target, float magnitude, const Bounds& bounds,
+                                       Vector& x) const {
   const std::size_t n = unknowns();
   const std::size_t m = row_weights.size();
-  Vector residual(m), step_rows(m), gradient(n), step_gradient(n), z(n), scratch;
+  Vector residual(m), step_rows(m), gx(n), step_gx(n), s(n), z(n), step(n), scratch;
+  Vector free(n, broadcast(1.0F));
 
-  const Vector zero(n);
-  const ChannelSums scale = preconditioned_gradient(magnitude, target, zero, z);
-
-  multiply(x, residual);
-  for (std::size_t r = 0; r < m; ++r) residual[r] = target[r] - residual[r];
-  regulariser.apply(x, magnitude, scratch, gradient);
-  ChannelSums gamma = preconditioned_gradient(magnitude, residual, gradient, z);
-  Vector step = z;
-
+  ChannelSums gamma{};
+  const ChannelSums scale = preconditioned_gradient(magnitude, free, target, Vector(n), s, z);
   const double tolerance2 = static_cast<double>(options.tolerance) * static_cast<double>(options.tolerance);
   const auto relative_gradient2 = [&] {
     double worst = 0;
@@ -233,40 +273,50 @@ SolveReport MapSolver::State::conjugate_gradients(const Vector& target, float ma
 
   SolveReport report;
   report.unknowns = n;
-  while (report.iterations < options.max_iterations && relative_gradient2() > tolerance2) {
-    multiply(step, step_rows);
-    const ChannelSums data_curvature = parallel_channel_sums(m, [&](std::size_t begin, std::size_t end) {
-      ChannelSums sums{};
-      for (std::size_t r = begin; r < end; ++r) {
-        add_product(sums, broadcast(row_weights[r]) * step_rows[r], step_rows[r]);
+  bool bounded = false;
+  while (!bounded && report.rounds < kMaxRounds) {
+    ++report.rounds;
+    multiply(x, residual);
+    for (std::size_t r = 0; r < m; ++r) residual[r] = target[r] - residual[r];
+    regulariser.apply(x, magnitude, scratch, gx);
+    gamma = preconditioned_gradient(magnitude, free, residual, gx, s, z);
+    step = z;
+    while (report.iterations < options.max_iterations && relative_gradient2() > tolerance2) {
+      multiply(step, step_rows);
+      const ChannelSums data_curvature = parallel_channel_sums(m, [&](std::size_t begin, std::size_t end) {
+        ChannelSums sums{};
+        for (std::size_t r = begin; r < end; ++r) {
+          add_product(sums, broadcast(row_weights[r]) * step_rows[r], step_rows[r]);
+        }
+        return sums;
+      });
+      const ChannelSums curvature = regulariser.apply(step, magnitude, scratch, step_gx);
+      ChannelSums length{};
+      for (std::size_t k = 0; k < 4; ++k) {
+        const double total = data_curvature[k] + curvature[k];
+        length[k] = total > 0 ? gamma[k] / total : 0;
       }
-      return sums;
-    });
-    const ChannelSums curvature = regulariser.apply(step, magnitude, scratch, step_gradient);
-    ChannelSums length{};
-    for (std::size_t k = 0; k < 4; ++k) {
-      const double total = data_curvature[k] + curvature[k];
-      length[k] = total > 0 ? gamma[k] / total : 0;
+      const Channels a = to_channels(length);
+      parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          x[i] += a * step[i];
+          gx[i] += a * step_gx[i];
+        }
+      });
+      parallel_for(m, kVectorGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t r = begin; r < end; ++r) residual[r] -= a * step_rows[r];
+      });
+      const ChannelSums next_gamma = preconditioned_gradient(magnitude, free, residual, gx, s, z);
+      ChannelSums ratio{};
+      for (std::size_t k = 0; k < 4; ++k) ratio[k] = gamma[k] > 0 ? next_gamma[k] / gamma[k] : 0;
+      gamma = next_gamma;
+      const Channels b = to_channels(ratio);
+      parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) step[i] = z[i] + b * step[i];
+      });
+      ++report.iterations;
     }
-    const Channels a = to_channels(length);
-    parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        x[i] += a * step[i];
-        gradient[i] += a * step_gradient[i];
-      }
-    });
-    parallel_for(m, kVectorGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) residual[r] -= a * step_rows[r];
-    });
-    const ChannelSums next_gamma = preconditioned_gradient(magnitude, residual, gradient, z);
-    ChannelSums ratio{};
-    for (std::size_t k = 0; k < 4; ++k) ratio[k] = gamma[k] > 0 ? next_gamma[k] / gamma[k] : 0;
-    gamma = next_gamma;
-    const Channels b = to_channels(ratio);
-    parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) step[i] = z[i] + b * step[i];
-    });
-    ++report.iterations;
+    bounded = !hold_to(bounds, s, x, free);
   }
   report.relative_gradient = std::sqrt(relative_gradient2());
   if (!std::isfinite(report.relative_gradient)) throw NumericalError("conjugate gradients diverged");
@@ -303,6 +353,13 @@ MapSolution MapSolver::solve(std::span<const float> target, int channels, std::s
     for (std::size_t r = 0; r < m; ++r) b[r] -= rendered[r];
   }
 
+  Bounds bounds{Vector(n), Vector(n)};
+  const Channels largest{kInfinity, kInfinity, kInfinity, 1.0F};
+  for (std::size_t i = 0; i < n; ++i) {
+    bounds.lower[i] = -base[i];
+    bounds.upper[i] = largest - base[i];
+  }
+
   Vector x(n);
   if (!initial.empty()) {
     x = seen_texels(widen(initial, channels));
@@ -320,7 +377,7 @@ MapSolution MapSolver::solve(std::span<const float> target, int channels, std::s
   }
 
   MapSolution solution;
-  solution.report = s.conjugate_gradients(b, prior.empty() ? 0.0F : s.options.prior_weight, x);
+  solution.report = s.minimise(b, prior.empty() ? 0.0F : s.options.prior_weight, bounds, x);
 
   Vector difference(s.layout.texels());
   for (std::size_t i = 0; i < n; ++i) difference[s.texels[i]] = x[i];

@@ -15,13 +15,14 @@ namespace mirrorbake {
 struct SolveOptions {
   float smoothness = 1e-3F;  ///< λ of squared differences between neighbouring texels of one level, ≥ 0
   float level_agreement = 1e-3F;  ///< λ of a texel's squared difference from the mean of its children, ≥ 0
-  float prior_weight = 1e-2F;     ///< λ of the squared difference from the prior, where one is given, ≥ 0
+  float prior_weight = 1e-3F;     ///< λ of the squared difference from the prior, where one is given, ≥ 0
   float tolerance = 1e-3F;        ///< stop when the preconditioned gradient has shrunk to this fraction, > 0
   int max_iterations = 200;       ///< 0…100000
 };
 
 struct SolveReport {
-  int iterations = 0;
+  int iterations = 0;              ///< of conjugate gradients, all rounds together
+  int rounds = 0;                  ///< of the active set that keeps the map within its bounds
   double relative_gradient = 0;  ///< what `tolerance` is compared with
   std::size_t unknowns = 0;      ///< texels that some row sees; the others are filled in smoothly
   double rms_error = 0;          ///< weighted root mean square of A x − b over rows and channels
@@ -55,7 +56,7 @@ class MapSolver {
 
   /// `target`: rows × channels. `prior` and `initial`: empty, or texels × channels; with a prior the regulariser acts
   /// on the difference from it (spec I2b); without an initial map, back-projection starts. 1 to 4 channels; the fourth is
-  /// coverage. The solution is clamped to [0, ∞), coverage to [0, 1]. Throws InvalidArgument for wrong lengths and for
+  /// coverage. The map is the best one with radiance ≥ 0 and coverage in [0, 1]. Throws InvalidArgument for wrong lengths and for
   /// values that are not finite, with their count.
   MapSolution solve(std::span<const float> target, int channels, std::span<const float> prior = {},
                     std::span<const float> initial = {}) const;

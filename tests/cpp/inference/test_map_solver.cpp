@@ -89,7 +89,14 @@ Eigen::MatrixXd dense_regulariser(const CubePyramidLayout& layout, const std::se
   return g;
 }
 
-// The solution of the same problem by dense normal equations in double.
+std::vector<float> random_around(float centre, std::size_t count, std::uint64_t seed) {
+  std::vector<float> values = testing::random_values(count, seed);
+  for (float& value : values) value += centre - 0.5F;
+  return values;
+}
+
+// The solution of the same problem by dense normal equations in double, for a target bright enough to stay within the
+// bounds by itself.
 TEST(MapSolver, AgreesWithADenseSolve) {
   const Problem problem = make_problem(24, 4, 8);
   SolveOptions options;
@@ -99,8 +106,8 @@ TEST(MapSolver, AgreesWithADenseSolve) {
   options.tolerance = 1e-7F;
   options.max_iterations = 2000;
   const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, options);
-  const std::vector<float> target = testing::random_values(3 * problem.matrix.rows(), 7);
-  const std::vector<float> prior = testing::random_values(3 * problem.layout.texels(), 8);
+  const std::vector<float> target = random_around(5.0F, 3 * problem.matrix.rows(), 7);
+  const std::vector<float> prior = random_around(5.0F, 3 * problem.layout.texels(), 8);
 
   const std::set<std::uint32_t> seen(problem.matrix.texels.begin(), problem.matrix.texels.end());
   ASSERT_LT(seen.size(), problem.layout.texels()) << "the test wants unseen texels too";
@@ -133,6 +140,44 @@ TEST(MapSolver, AgreesWithADenseSolve) {
       }
     }
   }
+}
+
+// The conditions of Karush, Kuhn and Tucker: where a texel is inside its bounds the gradient vanishes, where it is dark
+// the gradient does not want it brighter.
+TEST(MapSolver, IsTheBestMapWithinTheBounds) {
+  const Problem problem = make_problem(24, 4, 8);
+  SolveOptions options;
+  options.smoothness = 0.02F;
+  options.level_agreement = 0.05F;
+  options.tolerance = 1e-6F;
+  options.max_iterations = 20000;
+  const std::vector<float> target = random_around(0.1F, problem.matrix.rows(), 7);
+  const MapSolution solution =
+      MapSolver(problem.matrix, problem.row_weights, problem.layout, options).solve(target, 1);
+
+  const std::set<std::uint32_t> seen(problem.matrix.texels.begin(), problem.matrix.texels.end());
+  const Eigen::MatrixXd a = dense(problem.matrix);
+  const Eigen::MatrixXd g = dense_regulariser(problem.layout, seen, options, 0.0);
+  const Eigen::VectorXd w =
+      Eigen::Map<const Eigen::VectorXf>(problem.row_weights.data(), a.rows()).cast<double>();
+  const Eigen::VectorXd b = Eigen::Map<const Eigen::VectorXf>(target.data(), a.rows()).cast<double>();
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(a.cols());
+  for (std::uint32_t i : seen) x(i) = static_cast<double>(solution.texels[i]);
+  const Eigen::VectorXd gradient = a.transpose() * (w.asDiagonal() * (a * x - b)) + g.transpose() * (g * x);
+  // Of the size of the gradient at x = 0, whose entries reach a few units.
+  constexpr double kSmall = 1e-4;
+  std::size_t dark = 0;
+  for (std::uint32_t i : seen) {
+    ASSERT_GE(x(i), 0.0);
+    if (x(i) > 0.0) {
+      ASSERT_NEAR(gradient(i), 0.0, kSmall) << i;
+    } else {
+      ASSERT_GT(gradient(i), -kSmall) << i;
+      ++dark;
+    }
+  }
+  EXPECT_GT(dark, seen.size() / 20);
+  EXPECT_LT(dark, seen.size() / 2);
 }
 
 TEST(MapSolver, ReproducesATargetThatAMapCanMake) {

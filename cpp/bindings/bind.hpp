@@ -42,7 +42,8 @@ nb::ndarray<nb::numpy, typename V::value_type> vectors_to_numpy(std::vector<V>&&
 
 /// Reference view of `values`, kept alive by the Python object `owner`.
 template <typename V>
-nb::ndarray<nb::numpy, const typename V::value_type> vectors_view(const std::vector<V>& values, nb::handle owner) {
+nb::ndarray<nb::numpy, const typename V::value_type> vectors_view(const std::vector<V>& values,
+                                                                  nb::handle owner) {
   const std::size_t shape[2] = {values.size(), static_cast<std::size_t>(V::length())};
   return nb::ndarray<nb::numpy, const typename V::value_type>(values.data(), 2, shape, owner);
 }

@@ -29,9 +29,7 @@ std::atomic<Isa> active_limit{Isa::avx512};
 
 }  // namespace
 
-std::string_view to_string(Isa isa) {
-  return kNames.at(static_cast<std::size_t>(isa));
-}
+std::string_view to_string(Isa isa) { return kNames.at(static_cast<std::size_t>(isa)); }
 
 Isa parse_isa(std::string_view name) {
   const auto found = std::find(kNames.begin(), kNames.end(), name);
@@ -44,16 +42,10 @@ Isa best_isa() {
   return best;
 }
 
-Isa active_isa() {
-  return std::min(best_isa(), active_limit.load(std::memory_order_relaxed));
-}
+Isa active_isa() { return std::min(best_isa(), active_limit.load(std::memory_order_relaxed)); }
 
-IsaLimit::IsaLimit(Isa isa) : previous_(active_limit.load()) {
-  active_limit.store(std::min(previous_, isa));
-}
+IsaLimit::IsaLimit(Isa isa) : previous_(active_limit.load()) { active_limit.store(std::min(previous_, isa)); }
 
-IsaLimit::~IsaLimit() {
-  active_limit.store(previous_);
-}
+IsaLimit::~IsaLimit() { active_limit.store(previous_); }
 
 }  // namespace mirrorbake

@@ -27,16 +27,11 @@ enum class FileKind { exr, hdr, tiff, png, jpeg };
 
 const char* plugin_name(FileKind kind) {
   switch (kind) {
-    case FileKind::exr:
-      return "openexr";
-    case FileKind::hdr:
-      return "hdr";
-    case FileKind::tiff:
-      return "tiff";
-    case FileKind::png:
-      return "png";
-    case FileKind::jpeg:
-      return "jpeg";
+    case FileKind::exr: return "openexr";
+    case FileKind::hdr: return "hdr";
+    case FileKind::tiff: return "tiff";
+    case FileKind::png: return "png";
+    case FileKind::jpeg: return "jpeg";
   }
   return "";
 }
@@ -113,9 +108,7 @@ void check_limits(const std::string& path, std::int64_t width, std::int64_t heig
   }
 }
 
-bool is_integer(const OIIO::TypeDesc& format) {
-  return !format.is_floating_point();
-}
+bool is_integer(const OIIO::TypeDesc& format) { return !format.is_floating_point(); }
 
 bool says_linear(const OIIO::ImageSpec& spec) {
   const std::string space = spec.get_string_attribute("oiio:ColorSpace");
@@ -311,16 +304,11 @@ PixelFormat parse_pixel_format(std::string_view name) {
 
 std::vector<std::string> default_channels(int count) {
   switch (count) {
-    case 1:
-      return {"Y"};
-    case 2:
-      return {"Y", "A"};
-    case 3:
-      return {"R", "G", "B"};
-    case 4:
-      return {"R", "G", "B", "A"};
-    default:
-      throw InvalidArgument("channels", std::to_string(count), "1 to 4, or the names of the channels");
+    case 1: return {"Y"};
+    case 2: return {"Y", "A"};
+    case 3: return {"R", "G", "B"};
+    case 4: return {"R", "G", "B", "A"};
+    default: throw InvalidArgument("channels", std::to_string(count), "1 to 4, or the names of the channels");
   }
 }
 

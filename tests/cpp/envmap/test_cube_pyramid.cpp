@@ -39,7 +39,8 @@ TEST(CubePyramid, EveryLevelKeepsTheMeanRadiance) {
   for (int size : {32, 12}) {
     const CubePyramidLayout layout = CubePyramidLayout::full(size);
     std::vector<float> faces(layout.level_texels(0));
-    for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = unit_float(static_cast<std::uint32_t>(hash64(i)));
+    for (std::size_t i = 0; i < faces.size(); ++i)
+      faces[i] = unit_float(static_cast<std::uint32_t>(hash64(i)));
     const std::vector<float> pyramid = build_cube_pyramid(faces, layout, 1);
     const auto integral = [&](int level) {
       const int n = layout.level_size(level);
@@ -56,7 +57,8 @@ TEST(CubePyramid, EveryLevelKeepsTheMeanRadiance) {
     };
     // A texel is the union of its 2×2 children only where sides are even all the way down.
     if (size == 32) {
-      for (int level = 1; level < layout.levels; ++level) EXPECT_NEAR(integral(level) / integral(0), 1.0, 1e-6);
+      for (int level = 1; level < layout.levels; ++level)
+        EXPECT_NEAR(integral(level) / integral(0), 1.0, 1e-6);
     } else {
       EXPECT_NEAR(integral(1) / integral(0), 1.0, 1e-6);
     }

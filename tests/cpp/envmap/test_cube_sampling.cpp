@@ -77,7 +77,8 @@ TEST(CubeSampling, TexelsAcrossEdgesAreTheNearestAndMutual) {
           ASSERT_NE(to / face_texels, from / face_texels);
           float nearest = -1.0F;
           for (std::size_t t = 0; t < centres.size(); ++t) {
-            if (t / face_texels != from / face_texels) nearest = std::max(nearest, glm::dot(centres[t], centres[from]));
+            if (t / face_texels != from / face_texels)
+              nearest = std::max(nearest, glm::dot(centres[t], centres[from]));
           }
           // A corner texel has two equally near ones, one across each edge.
           EXPECT_NEAR(glm::dot(centres[to], centres[from]), nearest, 1e-6F);
@@ -111,7 +112,8 @@ TEST(CubeSampling, LookupIsContinuousAcrossEdgesAndCorners) {
     float previous = lookup(trilinear_footprint(layout, a, 0.0F), map);
     for (int i = 1; i <= kSteps; ++i) {
       const float angle = kStep * static_cast<float>(i);
-      const float value = lookup(trilinear_footprint(layout, std::cos(angle) * a + std::sin(angle) * b, 0.0F), map);
+      const float value =
+          lookup(trilinear_footprint(layout, std::cos(angle) * a + std::sin(angle) * b, 0.0F), map);
       ASSERT_LT(std::abs(value - previous), 64.0F * kStep) << "circle " << k << ", step " << i;
       previous = value;
     }
@@ -145,7 +147,8 @@ TEST(CubeSampling, LevelOfDetailCountsTexels) {
   for (float texels : {1.0F, 2.0F, 4.0F, 8.0F, 64.0F}) {
     for (float length : {1e-3F, 1.0F, 1e3F}) {
       const glm::vec3 d(0, 0, -length);
-      EXPECT_NEAR(cube_level_of_detail(layout, d, {texels * texel * length, 0, 0}, {0, 0, 0}), std::log2(texels), 1e-5F);
+      EXPECT_NEAR(cube_level_of_detail(layout, d, {texels * texel * length, 0, 0}, {0, 0, 0}),
+                  std::log2(texels), 1e-5F);
       // A differential along the ray changes nothing.
       EXPECT_EQ(cube_level_of_detail(layout, d, {0, 0, length}, {0, 0, 0}), 0.0F);
     }

@@ -43,8 +43,10 @@ TEST(Projection, CubeSolidAngleKeepsItsDigitsAt16384) {
   for (int column : {0, 1, 8191, 8192, 12345, 16383}) {
     for (int row : {0, 5000, 8192, 16383}) {
       const auto density = [&](int i, int j) {
-        const long double x = -1.0L + step * (static_cast<long double>(column) + 0.5L * static_cast<long double>(i));
-        const long double y = -1.0L + step * (static_cast<long double>(row) + 0.5L * static_cast<long double>(j));
+        const long double x =
+            -1.0L + step * (static_cast<long double>(column) + 0.5L * static_cast<long double>(i));
+        const long double y =
+            -1.0L + step * (static_cast<long double>(row) + 0.5L * static_cast<long double>(j));
         return std::pow(1.0L + x * x + y * y, -1.5L);
       };
       const long double weights[3] = {1.0L / 6, 4.0L / 6, 1.0L / 6};

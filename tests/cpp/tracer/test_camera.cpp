@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/tracer/camera.hpp"

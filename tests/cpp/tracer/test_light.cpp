@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <numbers>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/projection/cube.hpp"

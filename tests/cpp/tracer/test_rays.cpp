@@ -2,8 +2,8 @@
 
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
+#include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"

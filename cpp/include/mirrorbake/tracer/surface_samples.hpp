@@ -15,19 +15,19 @@ namespace mirrorbake {
 /// the reflector; all arrays have the same length or, where marked, may be empty. Entries are ordered by pixel,
 /// then by sample.
 struct SurfaceSamples {
-  int width = 0;                ///< of the image, pixels
-  int height = 0;               ///< of the image, pixels
+  int width = 0;   ///< of the image, pixels
+  int height = 0;  ///< of the image, pixels
   int samples_per_pixel = 0;
 
-  std::vector<std::uint32_t> pixel;      ///< y · width + x
-  std::vector<std::uint16_t> part;       ///< part of the reflector
-  std::vector<std::uint32_t> triangle;   ///< of the reflector's mesh
-  std::vector<glm::vec2> barycentric;    ///< weights of the triangle's second and third vertex
-  std::vector<glm::vec3> position;       ///< world space
+  std::vector<std::uint32_t> pixel;     ///< y · width + x
+  std::vector<std::uint16_t> part;      ///< part of the reflector
+  std::vector<std::uint32_t> triangle;  ///< of the reflector's mesh
+  std::vector<glm::vec2> barycentric;   ///< weights of the triangle's second and third vertex
+  std::vector<glm::vec3> position;      ///< world space
   /// Unit shading normal, towards the eye. Where the mesh's interpolated normal would reflect the view into the
   /// surface it is bent until the reflection just leaves it.
   std::vector<glm::vec3> normal;
-  std::vector<glm::vec3> reflection;     ///< unit direction r = 2(n·v)n − v
+  std::vector<glm::vec3> reflection;  ///< unit direction r = 2(n·v)n − v
 
   /// Change of `position` and `reflection` per pixel to the right (dx) and down (dy): ray differentials (Igehy,
   /// SIGGRAPH 1999), the point sliding in its triangle's plane, the normal interpolated. Bounded: near the silhouette
@@ -35,14 +35,14 @@ struct SurfaceSamples {
   std::vector<glm::vec3> dposition_dx, dposition_dy;
   std::vector<glm::vec3> dreflection_dx, dreflection_dy;
 
-  std::vector<glm::vec3> fresnel;        ///< F of the first bounce, per channel
-  std::vector<glm::vec3> albedo;         ///< diffuse albedo with texture, times (1 − F) under a coat
+  std::vector<glm::vec3> fresnel;  ///< F of the first bounce, per channel
+  std::vector<glm::vec3> albedo;   ///< diffuse albedo with texture, times (1 − F) under a coat
 
   // The light that was traced, one entry per sample, or empty when only visibility was asked for.
-  std::vector<glm::vec3> diffuse;        ///< D: radiance that the body reflects and emits
-  std::vector<glm::vec4> local;          ///< incident radiance from the reflector itself, premultiplied, and α
-  std::vector<glm::vec3> distant;        ///< incident radiance through the reflector
-  std::vector<float> hit_distance;       ///< along `reflection` to what the distant ray hits; +inf: nothing
+  std::vector<glm::vec3> diffuse;   ///< D: radiance that the body reflects and emits
+  std::vector<glm::vec4> local;     ///< incident radiance from the reflector itself, premultiplied, and α
+  std::vector<glm::vec3> distant;   ///< incident radiance through the reflector
+  std::vector<float> hit_distance;  ///< along `reflection` to what the distant ray hits; +inf: nothing
 
   std::size_t size() const { return pixel.size(); }
 };

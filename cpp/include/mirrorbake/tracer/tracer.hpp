@@ -24,15 +24,16 @@ enum class IndirectLight { none, cached, path };
 
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
-  int cache_rays = 64;       ///< gather rays per vertex of the `cached` indirect light, 1…65536; a quarter after the first bounce
-  int cache_bounces = 3;     ///< diffuse bounces that `cached` follows, 1…16
-  std::uint64_t seed = 0;    ///< of the cache
+  /// Gather rays per vertex of the `cached` indirect light, 1…65536; a quarter of them after the first bounce.
+  int cache_rays = 64;
+  int cache_bounces = 3;   ///< diffuse bounces that `cached` follows, 1…16
+  std::uint64_t seed = 0;  ///< of the cache
 };
 
 struct TraceOptions {
-  int samples_per_pixel = 16;   ///< 1…65536, stratified
-  int max_specular_depth = 8;   ///< mirror bounces after the first, 0…64; beyond it the reflection is black
-  int max_diffuse_depth = 4;    ///< diffuse bounces of `IndirectLight::path`, 0…64
+  int samples_per_pixel = 16;  ///< 1…65536, stratified
+  int max_specular_depth = 8;  ///< mirror bounces after the first, 0…64; beyond it the reflection is black
+  int max_diffuse_depth = 4;   ///< diffuse bounces of `IndirectLight::path`, 0…64
   std::uint64_t seed = 0;
 };
 
@@ -46,15 +47,16 @@ struct TraceOptions {
 /// rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel.
 struct LayerTrace {
   Image layers;
-  SurfaceSamples samples;        ///< with the traced light
-  std::vector<glm::vec3> sample_beauty;  ///< beauty value of each entry of `samples`, by the beauty integrator
+  SurfaceSamples samples;  ///< with the traced light
+  /// Beauty value of each entry of `samples`, by the beauty integrator.
+  std::vector<glm::vec3> sample_beauty;
 };
 
 /// First hit of a ray. A miss has `distance` = +inf.
 struct RayHit {
   float distance = std::numeric_limits<float>::infinity();
   std::int32_t object = -1;  ///< −1: nothing, or a rectangle light
-  glm::vec3 normal{0.0F};  ///< unit geometric normal
+  glm::vec3 normal{0.0F};    ///< unit geometric normal
 };
 
 /// A scene made ready for tracing. Construction validates the scene and builds the acceleration structures; all
@@ -82,7 +84,8 @@ class Tracer {
   /// Cube map of the radiance that arrives at `origin`, by rays that pass through the objects in `hidden`. What the rays
   /// show still bears those objects' shadows and reflections, as in the distant layer. Channels R, G, B, face after
   /// face (+X −X +Y −Y +Z −Z) from top to bottom in one image of `size` × 6·`size`.
-  Image capture_cube(glm::vec3 origin, int size, std::span<const int> hidden, const TraceOptions& options) const;
+  Image capture_cube(glm::vec3 origin, int size, std::span<const int> hidden,
+                     const TraceOptions& options) const;
 
   /// First hits of arbitrary rays that pass through the objects in `hidden`. Throws InvalidArgument for a ray that is not finite or has no direction.
   std::vector<RayHit> intersect(std::span<const glm::vec3> origins, std::span<const glm::vec3> directions,

@@ -610,7 +610,7 @@ class IndirectLight(enum.Enum):
 class TracerOptions:
     """What is decided once per scene."""
 
-    def __init__(self, *, indirect: IndirectLight = IndirectLight.cached, cache_rays: int = 256, cache_bounces: int = 3, seed: int = 0) -> None: ...
+    def __init__(self, *, indirect: IndirectLight = IndirectLight.cached, cache_rays: int = 64, cache_bounces: int = 3, seed: int = 0) -> None: ...
 
     @property
     def indirect(self) -> IndirectLight: ...
@@ -620,7 +620,7 @@ class TracerOptions:
 
     @property
     def cache_rays(self) -> int:
-        """Gather rays per vertex and bounce, 1 to 65536."""
+        """Gather rays per vertex, 1 to 65536; a quarter after the first bounce."""
 
     @cache_rays.setter
     def cache_rays(self, arg: int, /) -> None: ...

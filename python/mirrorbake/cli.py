@@ -7,9 +7,8 @@ interrupted.
 from __future__ import annotations
 
 import contextlib
-import functools
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -24,19 +23,17 @@ from rich.progress import (
 
 from mirrorbake import _core
 from mirrorbake.bake import ProgressReport, bake
+from mirrorbake.command import reports_errors
 from mirrorbake.config import load_config, parse_override
 from mirrorbake.demo import run_demo
 from mirrorbake.errors import InputError
 from mirrorbake.evaluate import METRICS_NAME, evaluate
 from mirrorbake.render import render
 from mirrorbake.report import metrics_table
+from mirrorbake.study import app as study_app
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-
-EXIT_INPUT = 3
-EXIT_NUMERICAL = 4
-EXIT_INTERRUPTED = 130
 
 app = typer.Typer(
     name="mirrorbake",
@@ -45,35 +42,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(study_app, name="study")
 messages = Console(stderr=True, highlight=False)
-
-P = ParamSpec("P")
-R = TypeVar("R")
-
-
-def _fail(text: str, status: int) -> typer.Exit:
-    # One line whatever the text holds; rich would wrap it and read brackets as markup.
-    typer.echo("mirrorbake: error: " + " ".join(text.split()), err=True)
-    return typer.Exit(status)
-
-
-def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
-    """Turn the errors of bad input into one line and an exit status."""
-
-    @functools.wraps(command)
-    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
-        try:
-            return command(*args, **kwargs)
-        except (InputError, _core.InvalidArgument, OSError) as failure:
-            raise _fail(str(failure), EXIT_INPUT) from None
-        except MemoryError:
-            raise _fail("not enough memory for images and maps of this size", EXIT_INPUT) from None
-        except ArithmeticError as failure:
-            raise _fail(str(failure), EXIT_NUMERICAL) from None
-        except KeyboardInterrupt:
-            raise _fail("interrupted", EXIT_INTERRUPTED) from None
-
-    return wrapped
 
 
 @contextlib.contextmanager

@@ -1,0 +1,293 @@
+// mb-fresnel: Fresnel curves, tables and the report of what each approximation costs (spec F1 to F5).
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/isa.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/image/image_io.hpp"
+#include "mirrorbake/shading/fresnel.hpp"
+#include "mirrorbake/shading/fresnel_table.hpp"
+#include "mirrorbake/shading/metals.hpp"
+
+namespace mirrorbake {
+namespace {
+
+struct Options {
+  std::string model = "dielectric";
+  double r0 = 0.04;
+  double ior = 1.5;
+  double eta = 0.2;
+  double k = 3.9;
+  std::string metal = "gold";
+  std::string illuminant = "D65";
+  int size = 0;
+  double max_error = 1e-3;
+  std::string out;
+  bool json = false;
+  int threads = 0;
+};
+
+Illuminant parse_illuminant(const std::string& name) { return name == "E" ? Illuminant::e : Illuminant::d65; }
+
+/// The curves asked for: one channel, or R, G, B for a metal.
+std::vector<ReflectanceFunction> curves_of(const Options& options) {
+  if (options.model == "metal") {
+    const Metal metal = parse_metal(options.metal);
+    const Illuminant illuminant = parse_illuminant(options.illuminant);
+    std::vector<ReflectanceFunction> channels;
+    for (int channel = 0; channel < 3; ++channel) {
+      channels.emplace_back(
+          [=](double c) { return std::clamp(metal_reflectance(metal, c, illuminant)[channel], 0.0, 1.0); });
+    }
+    return channels;
+  }
+  Fresnel fresnel;
+  fresnel.model = options.model == "schlick"     ? FresnelModel::schlick
+                  : options.model == "conductor" ? FresnelModel::conductor
+                                                 : FresnelModel::dielectric;
+  fresnel.r0 = glm::vec3(static_cast<float>(options.r0));
+  fresnel.eta = glm::vec3(static_cast<float>(options.model == "conductor" ? options.eta : options.ior));
+  fresnel.k = glm::vec3(static_cast<float>(options.k));
+  // The loops over arrays check parameters, and name what is wrong.
+  const std::vector<float> probe = {0.5F};
+  std::vector<glm::vec3> unused(1);
+  evaluate(fresnel, probe, unused);
+  return {reflectance_function(fresnel, 0)};
+}
+
+void write_table(const Options& options) {
+  const std::vector<ReflectanceFunction> curves = curves_of(options);
+  std::size_t size = static_cast<std::size_t>(options.size);
+  if (options.size == 0) {
+    for (const ReflectanceFunction& curve : curves) {
+      size = std::max(size, table_for_error(curve, options.max_error).values.size());
+    }
+  }
+  std::vector<FresnelTable> tables;
+  double max_error = 0;
+  for (const ReflectanceFunction& curve : curves) {
+    tables.push_back(make_table(curve, size));
+    max_error = std::max(max_error, tables.back().max_error);
+  }
+  if (options.out.empty()) {
+    std::printf(curves.size() == 3 ? "c,R,G,B\n" : "c,F\n");
+    for (std::size_t i = 0; i < size; ++i) {
+      std::printf("%.9g", static_cast<double>(i) / static_cast<double>(size - 1));
+      for (const FresnelTable& table : tables) std::printf(",%.9g", static_cast<double>(table.values[i]));
+      std::printf("\n");
+    }
+  } else {
+    Image image(static_cast<int>(size), 1, default_channels(static_cast<int>(tables.size())));
+    for (std::size_t i = 0; i < size; ++i) {
+      for (std::size_t channel = 0; channel < tables.size(); ++channel) {
+        image.pixels[i * tables.size() + channel] = tables[channel].values[i];
+      }
+    }
+    save_image(options.out, image, PixelFormat::float32);
+  }
+  std::fprintf(stderr, "%zu entries, largest error %.3g\n", size, max_error);
+}
+
+void print_metal(const Options& options) {
+  const Metal metal = parse_metal(options.metal);
+  const Illuminant illuminant = parse_illuminant(options.illuminant);
+  const glm::dvec3 normal = metal_reflectance(metal, 1.0, illuminant);
+  const MetalFit fit = fit_metal(metal, illuminant);
+  const std::string name(to_string(metal));
+  const std::string source(optical_constants(metal).source);
+  const auto row = [&](const char* label, glm::dvec3 v) {
+    std::printf(options.json ? ", \"%s\": [%.6g, %.6g, %.6g]" : "%-28s %8.4f %8.4f %8.4f\n", label, v.r, v.g,
+                v.b);
+  };
+  if (options.json) {
+    std::printf("{\"metal\": \"%s\", \"illuminant\": \"%s\", \"source\": \"%s\"", name.c_str(),
+                options.illuminant.c_str(), source.c_str());
+  } else {
+    std::printf("%s, %s\nlinear Rec.709, CIE 1931 2°, illuminant %s\n", name.c_str(), source.c_str(),
+                options.illuminant.c_str());
+  }
+  row("normal_incidence", normal);
+  row("schlick_r0", fit.schlick.r0);
+  row("schlick_max_error", fit.schlick_error);
+  row("eta", fit.conductor.eta);
+  row("k", fit.conductor.k);
+  row("conductor_max_error", fit.conductor_error);
+  if (options.json) std::printf("}\n");
+}
+
+// Report ------------------------------------------------------------------------------------------------------------
+
+constexpr std::size_t kReportCount = std::size_t{1} << 20;
+
+/// Shortest of several runs, ns per evaluation.
+double nanoseconds(const std::function<void()>& run) {
+  double best = 1e300;
+  for (int i = 0; i < 5; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    run();
+    const std::chrono::duration<double, std::nano> time = std::chrono::steady_clock::now() - start;
+    best = std::min(best, time.count());
+  }
+  return best / static_cast<double>(kReportCount);
+}
+
+struct Row {
+  std::string material;
+  double exact_float_error = 0;  // float32 against double
+  double exact_ns = 0;
+  double schlick_error = 0;  // r0 = F at normal incidence
+  double schlick_ns = 0;
+  std::optional<std::size_t> table_size;  // for max_error; none: not to be had with 65536 entries
+  double table_error = 0;
+  double table_ns = 0;
+};
+
+Row report_row(const std::string& name, double eta, double k, double max_error) {
+  const auto n32 = static_cast<float>(eta);
+  const auto k32 = static_cast<float>(k);
+  const auto exact = [&](double c) {
+    return fresnel_conductor(c, static_cast<double>(n32), static_cast<double>(k32));
+  };
+  std::vector<float> c(kReportCount);
+  std::vector<float> f(kReportCount);
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    c[i] = static_cast<float>(static_cast<double>(i) / static_cast<double>(c.size() - 1));
+  }
+  const auto error = [&] {
+    double worst = 0;
+    for (std::size_t i = 0; i < c.size(); ++i) {
+      worst = std::max(worst, std::abs(static_cast<double>(f[i]) - exact(static_cast<double>(c[i]))));
+    }
+    return worst;
+  };
+  Row row;
+  row.material = name;
+  row.exact_ns = nanoseconds([&] { fresnel_conductor(c, n32, k32, f); });
+  row.exact_float_error = error();
+  const auto r0 = static_cast<float>(exact(1.0));
+  row.schlick_ns = nanoseconds([&] { fresnel_schlick(c, r0, f); });
+  row.schlick_error = error();
+  try {
+    const FresnelTable table = table_for_error(exact, max_error);
+    row.table_size = table.values.size();
+    row.table_ns = nanoseconds([&] { evaluate(table, c, f); });
+    row.table_error = error();
+  } catch (const NumericalError&) {
+    // No table of this kind: the row says so.
+  }
+  return row;
+}
+
+void report(const Options& options) {
+  std::vector<Row> rows;
+  for (double n : {1.0001, 1.001, 1.01, 1.1, 1.33, 1.5, 2.0, 2.4, 4.0, 10.0, 50.0, 200.0}) {
+    char name[32];
+    std::snprintf(name, sizeof name, "n = %g", n);
+    rows.push_back(report_row(name, n, 0.0, options.max_error));
+  }
+  for (Metal metal : all_metals()) {
+    const Fresnel fit = fit_metal(metal).conductor;
+    rows.push_back(report_row(std::string(to_string(metal)) + ", green", static_cast<double>(fit.eta.g),
+                              static_cast<double>(fit.k.g), options.max_error));
+  }
+  if (options.json) {
+    std::printf("{\"isa\": \"%s\", \"threads\": %d, \"max_error\": %g, \"rows\": [",
+                std::string(to_string(active_isa())).c_str(), thread_count(), options.max_error);
+  } else {
+    std::printf("%-18s %10s %7s | %10s %7s | %7s %10s %7s   (%s, %d threads)\n", "material", "F2/F3 err",
+                "ns", "F1 err", "ns", "F4 size", "err", "ns", std::string(to_string(active_isa())).c_str(),
+                thread_count());
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Row& row = rows[i];
+    const std::string size = row.table_size ? std::to_string(*row.table_size) : (options.json ? "null" : "-");
+    std::printf(
+        options.json
+            ? "%s{\"material\": \"%s\", \"exact_error\": %.3g, \"exact_ns\": %.4g, \"schlick_error\": "
+              "%.3g, \"schlick_ns\": %.4g, \"table_size\": %s, \"table_error\": %.3g, "
+              "\"table_ns\": %.4g}"
+            : "%s%-18s %10.3g %7.3g | %10.3g %7.3g | %7s %10.3g %7.3g\n",
+        options.json && i > 0 ? ", " : "", row.material.c_str(), row.exact_float_error, row.exact_ns,
+        row.schlick_error, row.schlick_ns, size.c_str(), row.table_error, row.table_ns);
+  }
+  if (options.json) std::printf("]}\n");
+}
+
+int run(int argc, char** argv) {
+  Options options;
+  CLI::App app("Fresnel curves, tables and the report of what each approximation costs.");
+  app.set_version_flag("--version", MIRRORBAKE_VERSION);
+  app.add_option("--threads", options.threads, "Threads, 0 for all cores")->check(CLI::Range(0, 1024));
+  app.require_subcommand(1);
+
+  CLI::App* table =
+      app.add_subcommand("table", "A curve at equal steps of the cosine: CSV to stdout, or an image");
+  table->add_option("--model", options.model, "Which curve")
+      ->check(CLI::IsMember({"schlick", "dielectric", "conductor", "metal"}))
+      ->capture_default_str();
+  table->add_option("--r0", options.r0, "schlick: reflectance at normal incidence, 0 to 1")
+      ->capture_default_str();
+  table->add_option("--ior", options.ior, "dielectric: relative index")->capture_default_str();
+  table->add_option("--eta", options.eta, "conductor: refractive index")->capture_default_str();
+  table->add_option("--k", options.k, "conductor: extinction coefficient")->capture_default_str();
+  table->add_option("--metal", options.metal, "metal: name or symbol; R, G, B clamped to [0,1]")
+      ->capture_default_str();
+  table->add_option("--illuminant", options.illuminant, "metal: light its colour is seen in")
+      ->check(CLI::IsMember({"D65", "E"}))
+      ->capture_default_str();
+  table->add_option("--size", options.size, "Entries; 0 for as few as --max-error allows")
+      ->check(CLI::Range(0, 65536))
+      ->capture_default_str();
+  table->add_option("--max-error", options.max_error, "Largest error of linear interpolation")
+      ->capture_default_str();
+  table->add_option("--out", options.out, "Image of size × 1 pixels, float32 (.exr, .tif) instead of CSV");
+  table->callback([&] { write_table(options); });
+
+  CLI::App* metal =
+      app.add_subcommand("metal", "Colour of a metal from its measured spectrum, and models fitted to it");
+  metal->add_option("metal", options.metal, "Name or symbol")->required();
+  metal->add_option("--illuminant", options.illuminant, "Light its colour is seen in")
+      ->check(CLI::IsMember({"D65", "E"}))
+      ->capture_default_str();
+  metal->add_flag("--json", options.json, "One JSON object");
+  metal->callback([&] { print_metal(options); });
+
+  CLI::App* errors =
+      app.add_subcommand("report", "Error and time of Schlick and tables against the full equations");
+  errors->add_option("--max-error", options.max_error, "What tables are made for")->capture_default_str();
+  errors->add_flag("--json", options.json, "One JSON object");
+  errors->callback([&] { report(options); });
+
+  std::optional<ThreadLimit> limit;
+  app.parse_complete_callback([&] { limit.emplace(options.threads); });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace mirrorbake
+
+int main(int argc, char** argv) {
+  try {
+    return mirrorbake::run(argc, argv);
+  } catch (const mirrorbake::NumericalError& error) {
+    std::fprintf(stderr, "mb-fresnel: %s\n", error.what());
+    return 4;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "mb-fresnel: %s\n", error.what());
+    return 3;
+  }
+}

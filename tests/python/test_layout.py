@@ -20,7 +20,7 @@ ALLOWED["shading"] = {"core"}
 ALLOWED["envmap"] = {"core", "projection", "proxy", "image"}
 ALLOWED["prefilter"] = ALLOWED["envmap"] | {"envmap"}
 ALLOWED["scene"] = {"core", "image", "shading"}
-ALLOWED["tracer"] = ALLOWED["scene"] | {"scene"}
+ALLOWED["tracer"] = ALLOWED["scene"] | {"scene", "projection"}  # captures the world into a projection
 ALLOWED["inference"] = set(ALLOWED)
 ALLOWED["pem"] = set(ALLOWED)
 

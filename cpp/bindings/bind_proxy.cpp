@@ -82,12 +82,12 @@ void check_rays(const RayArray<Real>& positions, const char* second, const RayAr
     if (array.ndim() == 0 || array.shape(array.ndim() - 1) != 3) {
       throw InvalidArgument(name, "of shape " + shape_text(array), "shape (..., 3)");
     }
-    for (std::size_t i = 0; i < array.size(); ++i) {
-      if (!std::isfinite(array.data()[i])) {
-        throw InvalidArgument(name, std::to_string(array.data()[i]) + " in row " + std::to_string(i / 3),
-                              "finite");
-      }
-    }
+    using Vector = glm::vec<3, Real>;
+    if (all_finite(std::span(reinterpret_cast<const Vector*>(array.data()), array.size() / 3))) return;
+    std::size_t i = 0;
+    while (std::isfinite(array.data()[i])) ++i;
+    throw InvalidArgument(name, std::to_string(array.data()[i]) + " in row " + std::to_string(i / 3),
+                          "finite");
   };
   check("positions", positions);
   check(second, directions);
@@ -102,17 +102,17 @@ nb::ndarray<nb::numpy, Real> map_triples(const RayArray<Real>& first, const RayA
                                          Compute compute) {
   using Vector = glm::vec<3, Real>;
   const std::size_t count = first.size() / 3;
-  auto* results = new std::vector<Real>(first.size());
-  nb::capsule owner(results, [](void* p) noexcept { delete static_cast<std::vector<Real>*>(p); });
+  auto* results = new Real[first.size()];  // not initialised: all of it is written below
+  nb::capsule owner(results, [](void* p) noexcept { delete[] static_cast<Real*>(p); });
   {
     nb::gil_scoped_release release;
     compute(std::span(reinterpret_cast<const Vector*>(first.data()), count),
             std::span(reinterpret_cast<const Vector*>(second.data()), count),
-            std::span(reinterpret_cast<Vector*>(results->data()), count));
+            std::span(reinterpret_cast<Vector*>(results), count));
   }
   std::vector<std::size_t> shape;
   for (std::size_t i = 0; i < first.ndim(); ++i) shape.push_back(first.shape(i));
-  return nb::ndarray<nb::numpy, Real>(results->data(), shape.size(), shape.data(), owner);
+  return nb::ndarray<nb::numpy, Real>(results, shape.size(), shape.data(), owner);
 }
 
 template <typename Real>

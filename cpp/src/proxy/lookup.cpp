@@ -133,4 +133,12 @@ void mirror_lookups(const Proxy& proxy, glm::vec3 eye, std::span<const glm::vec3
   });
 }
 
+bool all_finite(std::span<const glm::vec3> vectors) {
+  return vectors.empty() || lookup_kernels().all_finite_f32(&vectors[0].x, 3 * vectors.size());
+}
+
+bool all_finite(std::span<const glm::dvec3> vectors) {
+  return vectors.empty() || lookup_kernels().all_finite_f64(&vectors[0].x, 3 * vectors.size());
+}
+
 }  // namespace mirrorbake

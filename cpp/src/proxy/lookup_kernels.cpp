@@ -93,12 +93,29 @@ void mirrors(const LookupConstants& k, const double* eye, const float* positions
                 [e](const Vec& p, const Vec& n) { return reflect(p, n, e); });
 }
 
+/// x·0 is 0 for finite x and NaN otherwise, which nothing added to the sum takes away again.
+template <typename T>
+bool all_finite(const T* values, std::size_t count) {
+  constexpr std::size_t kLanes = 32;  // independent sums, so that the loop is vectorised without reordering
+  T sums[kLanes] = {};
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) sums[lane] += values[i + lane] * T(0);
+  }
+  for (; i < count; ++i) sums[0] += values[i] * T(0);
+  T sum = 0;
+  for (const T lane : sums) sum += lane;
+  return sum == T(0);
+}
+
 }  // namespace
 
 const LookupKernels kLookupKernels = {
     .rays_f32 = rays<float>,
     .rays_f64 = rays<double>,
     .mirrors_f32 = mirrors,
+    .all_finite_f32 = all_finite<float>,
+    .all_finite_f64 = all_finite<double>,
 };
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

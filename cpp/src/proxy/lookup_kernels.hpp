@@ -27,6 +27,8 @@ struct LookupKernels {
                    double* lookups, std::size_t count);
   void (*mirrors_f32)(const LookupConstants& k, const double* eye, const float* positions,
                       const float* normals, float* lookups, std::size_t count);
+  bool (*all_finite_f32)(const float* values, std::size_t count);
+  bool (*all_finite_f64)(const double* values, std::size_t count);
 };
 
 /// The loops for active_isa().

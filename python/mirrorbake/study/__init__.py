@@ -81,3 +81,39 @@ def _print_fresnel(result: dict[str, Any]) -> None:
         errors = (curve["max_error"], curve["share_of_allowance"])
         table.add_row(curve["material"], curve["dtype"], *(_number(error) for error in errors))
     console.print(table)
+
+
+@app.command("proxy")
+@reports_errors
+def proxy_command(
+    json: Annotated[
+        bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for a plot. [default: none]")
+    ] = None,
+    samples: Annotated[
+        int, typer.Option("--samples", min=2, max=100_000, help="Rays per shape, flatness and depth.")
+    ] = 30,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the random rays.")] = 1,
+) -> None:
+    """Error of lookups on proxies, in float32 and float64, against 50 digits."""
+    from mirrorbake.study import proxy
+
+    errors = proxy.proxy_errors(samples, seed)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        proxy.plot(errors, out / "proxy-errors.png")
+        typer.echo(f"wrote {out / 'proxy-errors.png'}", err=True)
+    if json:
+        typer.echo(json_module.dumps(proxy.as_json(errors)))
+        return
+    table = Table("shape", "aspect", "arithmetic", "largest error, radians", "mean")
+    groups: dict[tuple[str, float, str], list[proxy.ProxyError]] = {}
+    for error in errors:
+        groups.setdefault((error.shape, error.aspect, error.arithmetic), []).append(error)
+    for (shape, aspect, arithmetic), group in groups.items():
+        mean = sum(error.mean for error in group) / len(group)
+        largest = max(error.largest for error in group)
+        table.add_row(shape, f"{aspect:g}", arithmetic, _number(largest), _number(mean))
+    Console(highlight=False).print(table)

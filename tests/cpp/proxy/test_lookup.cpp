@@ -344,6 +344,26 @@ TEST(Lookup, BatchRejectsSpansOfDifferentLength) {
   EXPECT_THROW(lookup_directions(Proxy{Box{}, {}}, three, three, two), InvalidArgument);
 }
 
+TEST(Lookup, AllFiniteFindsASingleBadNumberAnywhere) {
+  const float inf = std::numeric_limits<float>::infinity();
+  for (std::size_t count : {0U, 1U, 11U, 40U}) {
+    std::vector<glm::vec3> v(count, glm::vec3(std::numeric_limits<float>::max()));
+    std::vector<glm::dvec3> w(count, glm::dvec3(std::numeric_limits<double>::lowest()));
+    EXPECT_TRUE(all_finite(v));
+    EXPECT_TRUE(all_finite(w));
+    for (std::size_t i = 0; i < 3 * count; ++i) {
+      for (float bad : {inf, -inf, std::numeric_limits<float>::quiet_NaN()}) {
+        v[i / 3][static_cast<int>(i % 3)] = bad;
+        w[i / 3][static_cast<int>(i % 3)] = static_cast<double>(bad);
+        EXPECT_FALSE(all_finite(v));
+        EXPECT_FALSE(all_finite(w));
+        v[i / 3][static_cast<int>(i % 3)] = 1;
+        w[i / 3][static_cast<int>(i % 3)] = 1;
+      }
+    }
+  }
+}
+
 TEST(Lookup, MirrorsRejectSpansOfDifferentLength) {
   std::vector<glm::vec3> two(2), three(3);
   EXPECT_THROW(mirror_lookups(Proxy{Box{}, {}}, {0, 0, 0}, two, three, three), InvalidArgument);

@@ -27,9 +27,9 @@ def numpy_infinite(p: Any, d: Any) -> Any:
 
 
 def numpy_box(proxy: Proxy, p: Any, d: Any) -> Any:
-    q, e = (p - np.float32(proxy.centre)) @ proxy.axes.T, d @ proxy.axes.T
-    t = np.min((np.copysign(np.float32(proxy.half_extent), e) - q) / e, axis=1)
-    return p + t[:, None] * d - np.float32(proxy.origin)
+    q, e = (p - np.array(proxy.centre, np.float32)) @ proxy.axes.T, d @ proxy.axes.T
+    t = np.min((np.copysign(np.array(proxy.half_extent, np.float32), e) - q) / e, axis=1)
+    return p + t[:, None] * d - np.array(proxy.origin, np.float32)
 
 
 def numpy_sphere_exit(q: Any, e: Any) -> Any:
@@ -38,16 +38,16 @@ def numpy_sphere_exit(q: Any, e: Any) -> Any:
 
 
 def numpy_ellipsoid(proxy: Proxy, p: Any, d: Any) -> Any:
-    radii = np.float32(proxy.radii)
-    q, e = (p - np.float32(proxy.centre)) @ proxy.axes.T / radii, d @ proxy.axes.T / radii
-    return p + numpy_sphere_exit(q, e)[:, None] * d - np.float32(proxy.origin)
+    radii = np.array(proxy.radii, np.float32)
+    q, e = (p - np.array(proxy.centre, np.float32)) @ proxy.axes.T / radii, d @ proxy.axes.T / radii
+    return p + numpy_sphere_exit(q, e)[:, None] * d - np.array(proxy.origin, np.float32)
 
 
 def numpy_hemisphere(proxy: Proxy, p: Any, d: Any) -> Any:
     radius = np.float32(proxy.radius)
-    q, e = (p - np.float32(proxy.centre)) / radius, d / radius
+    q, e = (p - np.array(proxy.centre, np.float32)) / radius, d / radius
     floor = np.where(e[:, 1] < 0, -q[:, 1] / e[:, 1], np.float32(np.inf))
-    return p + np.minimum(numpy_sphere_exit(q, e), floor)[:, None] * d - np.float32(proxy.origin)
+    return p + np.minimum(numpy_sphere_exit(q, e), floor)[:, None] * d - np.array(proxy.origin, np.float32)
 
 
 def angles(a: Any, b: Any) -> Any:

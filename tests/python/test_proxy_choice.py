@@ -30,7 +30,8 @@ Floats = NDArray[np.float32]
 def scaled_sphere(centre: tuple[float, float, float], radii: tuple[float, float, float]) -> TriangleMesh:
     unit = make_sphere((0, 0, 0), 1, 200)
     return TriangleMesh(
-        (unit.positions * np.float32(radii) + np.float32(centre)).astype(np.float32), unit.triangles
+        (unit.positions * np.array(radii, np.float32) + np.array(centre, np.float32)).astype(np.float32),
+        unit.triangles,
     )
 
 

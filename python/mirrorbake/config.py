@@ -246,12 +246,12 @@ class Infer(_Section):
     longer away from it."""
     level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
     """Weight λ of a texel's difference from the mean of the four below it in the pyramid."""
-    prior: Literal["smooth", "captured"] = "smooth"
+    prior: Literal["smooth", "captured"] = "captured"
     """What the distant map's texels that a view does not determine fall back to: a smooth fill, or the
     captured surroundings."""
-    prior_weight: Annotated[float, Field(ge=0, le=1e6)] = 1e-2
+    prior_weight: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
     """Weight λ of the difference from the captured surroundings."""
-    footprint_scale: Annotated[float, Field(gt=0, le=4)] = 0.5
+    footprint_scale: Annotated[float, Field(gt=0, le=4)] = 0.25
     """Size of a lookup's footprint in pixels: 1 filters as graphics hardware does for one sample per pixel,
     less is sharper for supersampled images."""
     iterations: Annotated[int, Field(ge=0, le=100_000)] = 200

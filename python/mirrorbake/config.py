@@ -96,7 +96,7 @@ class Reflector(_Section):
     mesh: str | None = None
     """An .obj, .gltf or .glb file; or give `object`."""
     height: Annotated[float, Field(gt=0, le=1e4)] = 0.15
-    """The object is scaled to this height (the teapot: of its body)."""
+    """The object is scaled to this height (the teapot: from its foot to the tip of the knob)."""
     scale: Annotated[float, Field(gt=0, le=1e6)] | None = None
     """Scales a mesh's own units to metres, instead of `height`."""
     rotation: Vec3 = (0.0, 0.0, 0.0)

@@ -31,7 +31,7 @@ float random(std::uint64_t index, std::uint64_t seed) {
 }  // namespace
 
 Furnisher::Furnisher(Scene& scene) : scene_(scene), oak_(0), walnut_(0), white_paint_(0), brass_(0) {
-  oak_ = matte("oak", texture(textures::wood(from_srgb(0xdcb27c), from_srgb(0xa8763f))));
+  oak_ = matte("oak", texture(textures::wood(from_srgb(0xd8bb93), from_srgb(0xa27c53))));
   walnut_ = matte("walnut", texture(textures::wood(from_srgb(0x8a5a38), from_srgb(0x4a2c19))));
   white_paint_ = matte("white paint", from_srgb(0xe9e6df));
   brass_ = matte("brass", from_srgb(0xb08d3c));
@@ -63,10 +63,6 @@ int Furnisher::glazed(std::string name, glm::vec3 albedo) {
   scene_.materials.back().fresnel.eta = glm::vec3(1.5F);
   scene_.materials.back().layers = LayerModel::coated;
   return material;
-}
-
-void Furnisher::glow(int material, glm::vec3 radiance) {
-  scene_.materials[static_cast<std::size_t>(material)].emission = radiance;
 }
 
 void Furnisher::add(std::string name, TriangleMesh mesh, int material) {
@@ -124,7 +120,7 @@ void add_sofa(Furnisher& f, glm::vec3 place, float degrees) {
   const int teal = f.matte("teal cushion", f.texture(textures::weave(from_srgb(0x1f7a80))));
   TriangleMesh body;
   const auto pad = [&](glm::vec3 min, glm::vec3 max, float radius) {
-    append(body, make_rounded_block(min, max, radius, 10, kClothTile));
+    append(body, make_rounded_block(min, max, radius, 8, kClothTile));
   };
   pad({-0.85F, 0.08F, -0.40F}, {0.85F, 0.30F, 0.40F}, 0.03F);  // base
   pad({-0.69F, 0.30F, -0.40F}, {0.00F, 0.44F, 0.22F}, 0.05F);  // seats
@@ -226,9 +222,8 @@ void add_floor_lamp(Furnisher& f, glm::vec3 place) {
                                    {0.0F, 1.40F}},
                                   24);
   f.add("lamp stand", std::move(stand), f.brass());
-  // A paper shade, open at both ends, lit from within.
+  // A paper shade, open at both ends.
   const int shade = f.matte("lamp shade", from_srgb(0xf3dfb5));
-  f.glow(shade, glm::vec3(1.1F, 0.78F, 0.42F));
   f.add("lamp shade",
         make_lathe(place + glm::vec3(0, 1.30F, 0),
                    {{0.21F, 0.0F}, {0.14F, 0.30F}, {0.135F, 0.30F}, {0.205F, 0.0F}, {0.21F, 0.0F}}, 32),
@@ -342,12 +337,12 @@ void add_fruit(Furnisher& f, glm::vec3 place) {
                    48),
         f.glazed("bowl", from_srgb(0xe8e2d0)));
   TriangleMesh oranges;
-  append(oranges, make_sphere(place + glm::vec3(0.036F, 0.050F, 0.008F), 0.035F, 32));
-  append(oranges, make_sphere(place + glm::vec3(-0.022F, 0.050F, 0.034F), 0.034F, 32));
+  append(oranges, make_sphere(place + glm::vec3(0.036F, 0.050F, 0.008F), 0.035F, 24));
+  append(oranges, make_sphere(place + glm::vec3(-0.022F, 0.050F, 0.034F), 0.034F, 24));
   f.add("oranges", std::move(oranges), f.matte("oranges", from_srgb(0xf08a1d)));
   TriangleMesh apples;
-  append(apples, make_sphere(place + glm::vec3(-0.020F, 0.050F, -0.034F), 0.034F, 32));
-  append(apples, make_sphere(place + glm::vec3(-0.002F, 0.100F, 0.002F), 0.031F, 32));
+  append(apples, make_sphere(place + glm::vec3(-0.020F, 0.050F, -0.034F), 0.034F, 24));
+  append(apples, make_sphere(place + glm::vec3(-0.002F, 0.100F, 0.002F), 0.031F, 24));
   f.add("apples", std::move(apples), f.glazed("apples", from_srgb(0xa31621)));
 }
 
@@ -411,6 +406,33 @@ void add_book_pile(Furnisher& f, glm::vec3 place, float degrees) {
     y += b.thickness;
   }
   f.add("pages", std::move(pages), paper);
+}
+
+void add_napkin(Furnisher& f, glm::vec3 place, float degrees) {
+  constexpr float kThickness = 0.004F;
+  const glm::vec3 half(0.10F, 0.0F, 0.065F);
+  const int cloth =
+      f.matte("napkin", f.texture(textures::checkers(6, from_srgb(0xf4efe6), from_srgb(0xc8343c))));
+  TriangleMesh napkin =
+      make_picture({-half.x, kThickness, half.z}, {2.0F * half.x, 0, 0}, {0, 0, -2.0F * half.z}, 0.05F);
+  append(napkin, make_box(-half, half + glm::vec3(0.0F, kThickness - 5e-4F, 0.0F)));
+  f.add("napkin", placed(std::move(napkin), degrees, place), cloth);
+}
+
+void add_lemon(Furnisher& f, glm::vec3 place) {
+  f.add("lemon",
+        make_lathe(place,
+                   {{0.0F, 0.0F},
+                    {0.013F, 0.003F},
+                    {0.022F, 0.010F},
+                    {0.0265F, 0.021F},
+                    {0.0265F, 0.033F},
+                    {0.022F, 0.045F},
+                    {0.013F, 0.053F},
+                    {0.006F, 0.058F},
+                    {0.0F, 0.060F}},
+                   32),
+        f.matte("lemon", from_srgb(0xf3d32f)));
 }
 
 void add_toys(Furnisher& f, glm::vec3 place, float degrees) {

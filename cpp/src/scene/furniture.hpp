@@ -19,8 +19,6 @@ class Furnisher {
   int matte(std::string name, int albedo_texture);
   /// Diffuse under a clear coat of index 1.5: glazed, varnished, waxed things.
   int glazed(std::string name, glm::vec3 albedo);
-  /// Lets a material emit.
-  void glow(int material, glm::vec3 radiance);
   void add(std::string name, TriangleMesh mesh, int material);
 
   int oak() const { return oak_; }
@@ -52,6 +50,9 @@ void add_vase(Furnisher& f, glm::vec3 place);
 void add_fruit(Furnisher& f, glm::vec3 place);
 void add_draughts(Furnisher& f, glm::vec3 place, float degrees);
 void add_book_pile(Furnisher& f, glm::vec3 place, float degrees);
+/// A folded cloth, checkered, flat on the table.
+void add_napkin(Furnisher& f, glm::vec3 place, float degrees);
+void add_lemon(Furnisher& f, glm::vec3 place);
 void add_toys(Furnisher& f, glm::vec3 place, float degrees);
 
 }  // namespace mirrorbake::furniture

@@ -131,29 +131,25 @@ TriangleMesh make_lathe(glm::vec3 base, const std::vector<glm::vec2>& profile, i
     along[k + 1] = along[k] + glm::length(d);
     outward[k] = glm::normalize(glm::vec2(d.y, -d.x));
   }
-  // Normal of piece k at its end towards piece `other`.
-  const auto normal_at = [&](std::size_t k, std::size_t other) {
-    const bool is_smooth = other < pieces && glm::dot(outward[k], outward[other]) > kSmoothCosine;
-    return is_smooth ? glm::normalize(outward[k] + outward[other]) : outward[k];
-  };
   const std::uint32_t stride = static_cast<std::uint32_t>(segments) + 1;
-  for (std::size_t k = 0; k < pieces; ++k) {
-    const std::uint32_t first = static_cast<std::uint32_t>(mesh.positions.size());
-    const glm::vec2 normals[2] = {normal_at(k, k - 1),
-                                  normal_at(k, k + 1)};  // k − 1 wraps for k = 0: out of range
-    for (std::size_t end = 0; end < 2; ++end) {
-      const glm::vec2 p = profile[k + end];
-      for (std::uint32_t i = 0; i < stride; ++i) {
-        const float turn =
-            static_cast<float>(i % static_cast<std::uint32_t>(segments)) / static_cast<float>(segments);
-        const float x = std::cos(kTwoPi * turn);
-        const float z = -std::sin(kTwoPi * turn);
-        const glm::vec2 n = normals[end];
-        add_vertex(
-            mesh, base + glm::vec3(p.x * x, p.y, p.x * z), {n.x * x, n.y, n.x * z},
-            {repeats * static_cast<float>(i) / static_cast<float>(segments), along[k + end] / along.back()});
-      }
+  const auto add_ring = [&](std::size_t point, glm::vec2 normal) {
+    const glm::vec2 p = profile[point];
+    for (std::uint32_t i = 0; i < stride; ++i) {
+      const float turn = static_cast<float>(i % (stride - 1)) / static_cast<float>(segments);
+      const float x = std::cos(kTwoPi * turn);
+      const float z = -std::sin(kTwoPi * turn);
+      add_vertex(
+          mesh, base + glm::vec3(p.x * x, p.y, p.x * z), {normal.x * x, normal.y, normal.x * z},
+          {repeats * static_cast<float>(i) / static_cast<float>(segments), along[point] / along.back()});
     }
+  };
+  // Pieces that meet smoothly share a ring of vertices.
+  for (std::size_t k = 0; k < pieces; ++k) {
+    const bool is_smooth_below = k > 0 && glm::dot(outward[k - 1], outward[k]) > kSmoothCosine;
+    const bool is_smooth_above = k + 1 < pieces && glm::dot(outward[k], outward[k + 1]) > kSmoothCosine;
+    if (!is_smooth_below) add_ring(k, outward[k]);
+    add_ring(k + 1, is_smooth_above ? glm::normalize(outward[k] + outward[k + 1]) : outward[k]);
+    const std::uint32_t first = static_cast<std::uint32_t>(mesh.positions.size()) - 2 * stride;
     for (std::uint32_t i = 0; i + 1 < stride; ++i) {
       const std::uint32_t corner = first + i;
       if (profile[k].x > 0.0F) mesh.triangles.push_back({corner, corner + 1, corner + stride + 1});
@@ -164,7 +160,7 @@ TriangleMesh make_lathe(glm::vec3 base, const std::vector<glm::vec2>& profile, i
 }
 
 TriangleMesh make_curtain(glm::vec3 corner, glm::vec3 width, float height, int folds, float depth) {
-  constexpr int kColumnsPerFold = 10;
+  constexpr int kColumnsPerFold = 8;
   const float length = glm::length(width);
   const glm::vec3 along = width / length;
   const glm::vec3 up(0.0F, 1.0F, 0.0F);

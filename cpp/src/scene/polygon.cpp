@@ -8,7 +8,7 @@
 namespace mirrorbake {
 namespace {
 
-// Ear clipping takes time in the cube of the number of corners: beyond this, files of garbage would take minutes, and
+// Ear clipping may take time in the cube of the number of corners: beyond this, files of garbage would take minutes, and
 // real polygons are convex caps, for which a fan is right.
 constexpr std::size_t kMaxEarCorners = 512;
 
@@ -62,14 +62,16 @@ void triangulate(std::span<const std::uint32_t> corners, const std::vector<glm::
     triples.push_back(is_first_good ? glm::uvec3(0, 2, 3) : glm::uvec3(1, 2, 3));
     return;
   }
+  if (count > kMaxEarCorners) {
+    for (std::uint32_t i = 1; i + 1 < count; ++i) triples.push_back({0, i, i + 1});
+    return;
+  }
   std::vector<std::uint32_t> rest(count);
   std::iota(rest.begin(), rest.end(), 0U);
   while (rest.size() > 3) {
     std::size_t ear = 0;
-    if (count <= kMaxEarCorners) {
-      while (ear < rest.size() && !polygon.is_ear(rest, ear)) ++ear;
-    }
-    if (ear == rest.size() || count > kMaxEarCorners) ear = 1;  // a twisted polygon, or a huge one: a fan
+    while (ear < rest.size() && !polygon.is_ear(rest, ear)) ++ear;
+    if (ear == rest.size()) ear = 1;  // a twisted polygon has none
     triples.push_back(
         {rest[(ear + rest.size() - 1) % rest.size()], rest[ear], rest[(ear + 1) % rest.size()]});
     rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(ear));

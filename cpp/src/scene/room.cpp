@@ -50,11 +50,12 @@ void add_walls(Furnisher& f) {
        {0.6F, 0.7F});
   wall("east wall", north_east, z, textures::stripes(from_srgb(0xb9cfae), from_srgb(0x7fa27a)), {0.9F, 0.9F});
   wall("south wall", south_east, -x, textures::bricks(), {1.0F, 1.0F});
-  wall("west wall", south_west, -z, textures::diamonds(from_srgb(0x3f6fa3), from_srgb(0x86b0d6)),
+  wall("west wall", south_west, -z, textures::diamonds(from_srgb(0x5b8cc0), from_srgb(0xa9cbe8)),
        {0.7F, 0.7F});
   f.add("floor", make_panel(south_west, x, -z, kWallCell, glm::vec2(1.2F)),
         f.matte("floor", f.texture(textures::floorboards())));
-  f.add("ceiling", make_panel({kWest, kCeiling, kNorth}, x, z, kWallCell, glm::vec2(1.0F)), f.white_paint());
+  f.add("ceiling", make_panel({kWest, kCeiling, kNorth}, x, z, 2.0F * kWallCell, glm::vec2(1.0F)),
+        f.white_paint());
 
   TriangleMesh skirting;
   constexpr float kHigh = kFloor + 0.1F;
@@ -107,7 +108,7 @@ void add_window(Scene& scene, Furnisher& f) {
   daylight.corner = {kEast - 0.005F, kWindowBottom, kWindowNorth};
   daylight.edge_u = {0, 0, kWindowSouth - kWindowNorth};
   daylight.edge_v = {0, kWindowTop - kWindowBottom, 0};
-  daylight.radiance = {1.5F, 1.85F, 2.4F};
+  daylight.radiance = {2.4F, 2.9F, 3.6F};
   scene.rectangle_lights.push_back(daylight);
 }
 
@@ -118,7 +119,7 @@ void add_ceiling_light(Scene& scene, Furnisher& f) {
   light.corner = {-0.2F - kHalf, kCeiling - kDrop, -0.1F - kHalf};
   light.edge_u = {2.0F * kHalf, 0, 0};
   light.edge_v = {0, 0, 2.0F * kHalf};
-  light.radiance = {4.6F, 4.2F, 3.6F};
+  light.radiance = {10.4F, 10.0F, 9.2F};
   scene.rectangle_lights.push_back(light);
 
   const glm::vec3 min = light.corner;
@@ -240,13 +241,17 @@ Scene make_room() {
   add_painting(f, "circles", {0.10F, 0.45F, kSouth}, {-1.0F, 0, 0}, 0.75F, textures::circles());
   add_clock(f, {1.25F, 1.05F, kSouth}, 0.2F);
 
-  furniture::add_cup_and_saucer(f, "white cup", {0.19F, 0.0F, 0.24F}, 30.0F, from_srgb(0xf1ede4));
-  furniture::add_cup_and_saucer(f, "mint cup", {-0.27F, 0.0F, -0.20F}, 200.0F, from_srgb(0x9fd0bf));
-  furniture::add_vase(f, {0.44F, 0.0F, -0.27F});
-  furniture::add_fruit(f, {0.40F, 0.0F, 0.06F});
-  furniture::add_draughts(f, {-0.40F, 0.0F, 0.10F}, 18.0F);
-  furniture::add_book_pile(f, {0.05F, 0.0F, -0.31F}, 8.0F);
-  furniture::add_toys(f, {-0.12F, 0.0F, 0.28F}, 25.0F);
+  // The side towards +Z and +X is where views usually are: only low things lie there, near the table's edge, where they
+  // are reflected but hide nothing.
+  furniture::add_book_pile(f, {-0.10F, 0.0F, -0.30F}, 8.0F);
+  furniture::add_vase(f, {0.10F, 0.0F, -0.36F});
+  furniture::add_cup_and_saucer(f, "mint cup", {-0.27F, 0.0F, -0.17F}, 200.0F, from_srgb(0x9fd0bf));
+  furniture::add_fruit(f, {-0.38F, 0.0F, 0.0F});
+  furniture::add_draughts(f, {-0.36F, 0.0F, 0.24F}, 18.0F);
+  furniture::add_toys(f, {0.33F, 0.0F, -0.30F}, 200.0F);
+  furniture::add_cup_and_saucer(f, "white cup", {0.36F, 0.0F, 0.24F}, 30.0F, from_srgb(0xf1ede4));
+  furniture::add_napkin(f, {0.02F, 0.0F, 0.33F}, -12.0F);
+  furniture::add_lemon(f, {0.46F, 0.0F, 0.02F});
   return scene;
 }
 

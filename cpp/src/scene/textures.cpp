@@ -16,11 +16,9 @@ namespace {
 
 constexpr float kTwoPi = 2.0F * std::numbers::pi_v<float>;
 
-// Every texel is the mean of 2 × 2 points, so that edges are smooth.
-constexpr int kSupersampling = 2;
-
-// Calls colour(u, v) for points of the unit square, v up.
-template <typename Colour>
+// Calls colour(u, v) for points of the unit square, v up. Every texel is the mean of kSupersampling² points: 1 is
+// enough for what has no sharp edges.
+template <int kSupersampling = 2, typename Colour>
 Image paint(int width, int height, const Colour& colour) {
   Image image(width, height, {"R", "G", "B"});
   const auto paint_row = [&](int y) {
@@ -88,7 +86,7 @@ glm::vec3 from_srgb(unsigned hex) {
 }
 
 Image wood(glm::vec3 light, glm::vec3 dark) {
-  return paint(512, 512, [&](float u, float v) {
+  return paint<1>(512, 512, [&](float u, float v) {
     return glm::mix(light, dark, glm::smoothstep(0.2F, 0.8F, grain(u, v, 11)));
   });
 }
@@ -97,7 +95,7 @@ Image floorboards() {
   constexpr int kRows = 8;  // of boards per tile, each with one joint
   const glm::vec3 light = from_srgb(0xc69a6b);
   const glm::vec3 dark = from_srgb(0x83552f);
-  return paint(512, 512, [&](float u, float v) {
+  return paint<1>(512, 512, [&](float u, float v) {
     const float rows = v * kRows;
     const int row = wrap(static_cast<int>(std::floor(rows)), kRows);
     const float across = rows - std::floor(rows);
@@ -118,7 +116,7 @@ Image bricks() {
   constexpr int kColumns = 4;
   constexpr int kRows = 12;
   const glm::vec3 mortar = from_srgb(0xbdb3a4);
-  return paint(512, 512, [&](float u, float v) {
+  return paint<1>(512, 512, [&](float u, float v) {
     const float y = v * kRows;
     const int row = wrap(static_cast<int>(std::floor(y)), kRows);
     const float x = u * kColumns + (row % 2 == 0 ? 0.0F : 0.5F);
@@ -176,7 +174,7 @@ Image checkers(int squares, glm::vec3 light, glm::vec3 dark) {
 }
 
 Image weave(glm::vec3 colour) {
-  return paint(256, 256, [&](float u, float v) {
+  return paint<1>(256, 256, [&](float u, float v) {
     const float warp = std::sin(kTwoPi * 32.0F * u);
     const float weft = std::sin(kTwoPi * 32.0F * v);
     return colour * (0.85F + 0.15F * warp * weft) * (0.9F + 0.2F * noise(u, v, 24, 24, 41));
@@ -186,7 +184,7 @@ Image weave(glm::vec3 colour) {
 Image leaves() {
   const glm::vec3 shade = from_srgb(0x16330f);
   const glm::vec3 light = from_srgb(0x7fa845);
-  return paint(256, 256, [&](float u, float v) {
+  return paint<1>(256, 256, [&](float u, float v) {
     const float t = 0.6F * noise(u, v, 24, 24, 51) + 0.4F * noise(u, v, 48, 48, 52);
     return glm::mix(shade, light, glm::smoothstep(0.25F, 0.8F, t));
   });

@@ -1,3 +1,4 @@
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -7,8 +8,14 @@
 
 #include "bind.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/envmap/compare.hpp"
+#include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
+#include "mirrorbake/envmap/envmap_io.hpp"
+#include "mirrorbake/envmap/footprint.hpp"
+#include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/envmap/resample.hpp"
+#include "mirrorbake/envmap/sampling.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -88,6 +95,155 @@ void bind_envmap(nb::module_& m) {
       nb::arg("layout"), nb::arg("values"), nb::arg("projection"), nb::arg("width"), nb::arg("height"),
       nb::arg("filter"), nb::arg("source_from_target"),
       "The finest level in another projection and size: a block of one level.");
+
+  m.def(
+      "build_mips",
+      [](const EnvMapLayout& layout, FloatArray values, const std::string& filter) {
+        const MipFilter mip_filter = parse_mip_filter(filter);
+        EnvMap result;
+        {
+          nb::gil_scoped_release released;
+          result = build_mips(view(layout, values), mip_filter);
+        }
+        return block(std::move(result.values));
+      },
+      nb::arg("layout"), nb::arg("values"), nb::arg("filter"),
+      "All levels from the finest: box, solid_angle or seamless.");
+  m.def(
+      "measure_seam",
+      [](const EnvMapLayout& layout, FloatArray values, int level) {
+        const SeamReport report = measure_seam(view(layout, values), level);
+        return nb::make_tuple(report.across, report.inside);
+      },
+      nb::arg("layout"), nb::arg("values"), nb::arg("level"),
+      nb::sig("def measure_seam(layout: EnvMapLayout, values: NDArray[numpy.float32], level: int) -> "
+              "tuple[float, float]"),
+      "Largest steps between neighbouring texels: across the edges of faces, and inside of faces.");
+  m.def(
+      "add_border",
+      [](const EnvMapLayout& layout, FloatArray values, int level, int border) {
+        std::vector<float> result = add_border(view(layout, values), level, border);
+        const std::size_t wide = static_cast<std::size_t>(layout.level_width(level) + 2 * border);
+        const std::size_t high = static_cast<std::size_t>(layout.level_height(level) + 2 * border);
+        return to_numpy(std::move(result), {static_cast<std::size_t>(face_count(layout.projection)), high,
+                                            wide, static_cast<std::size_t>(layout.channels)});
+      },
+      nb::arg("layout"), nb::arg("values"), nb::arg("level"), nb::arg("border"),
+      "Faces of a level with a border of their neighbours' texels: (faces, height, width, channels).");
+  m.def(
+      "sample",
+      [](const EnvMapLayout& layout, FloatArray values, PointArray directions, std::optional<PointArray> ddx,
+         std::optional<PointArray> ddy, const std::string& filter, double max_anisotropy) {
+        const auto vectors = [](const PointArray& a) {
+          return std::span(reinterpret_cast<const glm::vec3*>(a.data()), a.shape(0));
+        };
+        const std::span<const glm::vec3> none;
+        const SampleOptions options{parse_sample_filter(filter), max_anisotropy};
+        std::vector<float> result(directions.shape(0) * static_cast<std::size_t>(layout.channels));
+        {
+          nb::gil_scoped_release released;
+          const std::size_t unusable =
+              sample(view(layout, values), vectors(directions), ddx ? vectors(*ddx) : none,
+                     ddy ? vectors(*ddy) : none, options, result);
+          if (unusable > 0) {
+            throw InvalidArgument("directions", std::to_string(unusable) + " NaN, infinite or zero vectors",
+                                  "finite vectors of a length above 0");
+          }
+        }
+        return to_numpy(std::move(result), {directions.shape(0), static_cast<std::size_t>(layout.channels)});
+      },
+      nb::arg("layout"), nb::arg("values"), nb::arg("directions"), nb::arg("ddx") = nb::none(),
+      nb::arg("ddy") = nb::none(), nb::arg("filter") = "bilinear", nb::arg("max_anisotropy") = 16.0,
+      "Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials (n, "
+      "3).");
+  m.def(
+      "quad_differentials",
+      [](FloatImage directions) {
+        if (directions.shape(2) != 3) {
+          throw InvalidArgument("directions", std::to_string(directions.shape(2)) + " components", "3");
+        }
+        const std::size_t height = directions.shape(0);
+        const std::size_t width = directions.shape(1);
+        std::vector<glm::vec3> ddx(width * height);
+        std::vector<glm::vec3> ddy(width * height);
+        quad_differentials(static_cast<int>(width), static_cast<int>(height),
+                           {reinterpret_cast<const glm::vec3*>(directions.data()), width * height}, ddx, ddy);
+        return nb::make_tuple(vectors_to_numpy(std::move(ddx)), vectors_to_numpy(std::move(ddy)));
+      },
+      nb::arg("directions"),
+      nb::sig("def quad_differentials(directions: NDArray[numpy.float32]) -> "
+              "tuple[NDArray[numpy.float32], NDArray[numpy.float32]]"),
+      "Differences within quads of 2x2 pixels of an image of directions (height, width, 3): two arrays\n"
+      "(height * width, 3).");
+  m.def(
+      "footprint_from_corners",
+      [](glm::vec3 top_left, glm::vec3 top_right, glm::vec3 bottom_right, glm::vec3 bottom_left) {
+        const Footprint f = footprint_from_corners({top_left, top_right, bottom_right, bottom_left});
+        return nb::make_tuple(f.direction, f.ddx, f.ddy);
+      },
+      nb::arg("top_left"), nb::arg("top_right"), nb::arg("bottom_right"), nb::arg("bottom_left"),
+      "Direction and differentials of the reflection cone through a pixel's corners.");
+  m.def("reflected_differential", &reflected_differential, nb::arg("direction"), nb::arg("normal"),
+        nb::arg("dd"), nb::arg("dn"), "Differential of the mirror direction of a ray (Igehy 1999).");
+  m.def(
+      "convert_convention",
+      [](const EnvMapLayout& layout, FloatArray values, const std::string& name, bool to_foreign) {
+        return block(convert_convention(view(layout, values), name,
+                                        to_foreign ? ConventionWay::to_foreign : ConventionWay::from_foreign)
+                         .values);
+      },
+      nb::arg("layout"), nb::arg("values"), nb::arg("name"), nb::arg("to_foreign"),
+      "The map in, or from, the orientation of openexr, oiio, mitsuba, threejs or ktx2.");
+  m.def(
+      "load_envmap",
+      [](const std::string& path, std::optional<std::string> projection, const std::string& faces) {
+        std::optional<Projection> given;
+        if (projection) given = parse_projection(*projection);
+        const FaceLayout face_layout = parse_face_layout(faces);
+        EnvMap map;
+        {
+          nb::gil_scoped_release released;
+          map = load_envmap(path, given, face_layout);
+        }
+        return nb::make_tuple(map.layout, block(std::move(map.values)), map.channels);
+      },
+      nb::arg("path"), nb::arg("projection") = nb::none(), nb::arg("faces") = "automatic",
+      nb::sig("def load_envmap(path: str, projection: str | None = None, faces: str = 'automatic') -> "
+              "tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]"),
+      "Layout, values and names of the channels of a map in an image or KTX2 file.");
+  m.def(
+      "save_envmap",
+      [](const std::string& path, const EnvMapLayout& layout, FloatArray values,
+         const std::vector<std::string>& channels, const std::string& faces, const std::string& format) {
+        const FaceLayout face_layout = parse_face_layout(faces);
+        const PixelFormat pixel_format = parse_pixel_format(format);
+        EnvMapView map = view(layout, values);
+        map.channels = channels;
+        nb::gil_scoped_release released;
+        return save_envmap(path, map, face_layout, pixel_format);
+      },
+      nb::arg("path"), nb::arg("layout"), nb::arg("values"), nb::arg("channels"),
+      nb::arg("faces") = "automatic", nb::arg("format") = "automatic",
+      "Write the finest level as an image, or all levels as KTX2.");
+
+  nb::class_<Comparison>(m, "Comparison", "How two maps differ, texels weighted by solid angle.")
+      .def_ro("max_error", &Comparison::max_error, "Largest difference.")
+      .def_ro("mean_error", &Comparison::mean_error, "Mean difference over the sphere.")
+      .def_ro("rms_error", &Comparison::rms_error, "Root of the mean squared difference.")
+      .def_ro("relative_l2", &Comparison::relative_l2, "RMS error over the RMS of the reference.")
+      .def_ro("psnr", &Comparison::psnr, "20 log10(largest value of the reference / RMS error), dB.")
+      .def_ro("flux_ratio", &Comparison::flux_ratio, "Flux of the map over that of the reference.")
+      .def_ro("not_finite", &Comparison::not_finite,
+              "Number of NaN and infinite values, left out of the rest.");
+  m.def(
+      "compare_envmaps",
+      [](const EnvMapLayout& layout, FloatArray values, const EnvMapLayout& reference_layout,
+         FloatArray reference) {
+        nb::gil_scoped_release released;
+        return compare(view(layout, values), view(reference_layout, reference));
+      },
+      nb::arg("layout"), nb::arg("values"), nb::arg("reference_layout"), nb::arg("reference"),
+      "The finest level of a map against a reference.");
 }
 
 }  // namespace mirrorbake::bindings

@@ -208,7 +208,7 @@ struct Convert {
     const float c = std::cos(angle);
     const float s = std::sin(angle);
     ResampleOptions options{parse_resample_filter(filter)};
-    options.source_from_target = glm::mat3(glm::vec3(c, 0, s), glm::vec3(0, 1, 0), glm::vec3(-s, 0, c));
+    options.source_from_target = glm::mat3(glm::vec3(c, 0, -s), glm::vec3(0, 1, 0), glm::vec3(s, 0, c));
     const bool same = target == source.layout.projection && wanted.width == source.layout.width &&
                       wanted.height == source.layout.height && turn == 0.0F;
     EnvMap result = same ? source : resample(source, target, wanted.width, wanted.height, options);

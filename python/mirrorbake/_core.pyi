@@ -907,6 +907,85 @@ def integrate(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], di
 def resample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], projection: str, width: int, height: int, filter: str, source_from_target: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
     """The finest level in another projection and size: a block of one level."""
 
+def build_mips(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], filter: str) -> NDArray[numpy.float32]:
+    """All levels from the finest: box, solid_angle or seamless."""
+
+def measure_seam(layout: EnvMapLayout, values: NDArray[numpy.float32], level: int) -> tuple[float, float]:
+    """
+    Largest steps between neighbouring texels: across the edges of faces, and inside of faces.
+    """
+
+def add_border(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], level: int, border: int) -> NDArray[numpy.float32]:
+    """
+    Faces of a level with a border of their neighbours' texels: (faces, height, width, channels).
+    """
+
+def sample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], ddx: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, ddy: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, filter: str = 'bilinear', max_anisotropy: float = 16.0) -> NDArray[numpy.float32]:
+    """
+    Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials (n, 3).
+    """
+
+def quad_differentials(directions: NDArray[numpy.float32]) -> tuple[NDArray[numpy.float32], NDArray[numpy.float32]]:
+    """
+    Differences within quads of 2x2 pixels of an image of directions (height, width, 3): two arrays
+    (height * width, 3).
+    """
+
+def footprint_from_corners(top_left: Sequence[float], top_right: Sequence[float], bottom_right: Sequence[float], bottom_left: Sequence[float]) -> tuple:
+    """
+    Direction and differentials of the reflection cone through a pixel's corners.
+    """
+
+def reflected_differential(direction: Sequence[float], normal: Sequence[float], dd: Sequence[float], dn: Sequence[float]) -> Sequence[float]:
+    """Differential of the mirror direction of a ray (Igehy 1999)."""
+
+def convert_convention(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], name: str, to_foreign: bool) -> NDArray[numpy.float32]:
+    """
+    The map in, or from, the orientation of openexr, oiio, mitsuba, threejs or ktx2.
+    """
+
+def load_envmap(path: str, projection: str | None = None, faces: str = 'automatic') -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]:
+    """
+    Layout, values and names of the channels of a map in an image or KTX2 file.
+    """
+
+def save_envmap(path: str, layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], channels: Sequence[str], faces: str = 'automatic', format: str = 'automatic') -> SaveReport:
+    """Write the finest level as an image, or all levels as KTX2."""
+
+class Comparison:
+    """How two maps differ, texels weighted by solid angle."""
+
+    @property
+    def max_error(self) -> float:
+        """Largest difference."""
+
+    @property
+    def mean_error(self) -> float:
+        """Mean difference over the sphere."""
+
+    @property
+    def rms_error(self) -> float:
+        """Root of the mean squared difference."""
+
+    @property
+    def relative_l2(self) -> float:
+        """RMS error over the RMS of the reference."""
+
+    @property
+    def psnr(self) -> float:
+        """20 log10(largest value of the reference / RMS error), dB."""
+
+    @property
+    def flux_ratio(self) -> float:
+        """Flux of the map over that of the reference."""
+
+    @property
+    def not_finite(self) -> int:
+        """Number of NaN and infinite values, left out of the rest."""
+
+def compare_envmaps(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], reference_layout: EnvMapLayout, reference: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> Comparison:
+    """The finest level of a map against a reference."""
+
 class CubePyramidLayout:
     """
     Order of the texels of a cube map with all its mip levels: the finest level first, in a level the six faces (+X -X +Y -Y +Z -Z), in a face the rows from the top.

@@ -1,0 +1,226 @@
+"""Environment maps: load, save, resample, filter, sample and compare.
+
+Examples
+--------
+>>> import numpy as np
+>>> panorama = EnvMap.from_array(np.ones((64, 128, 3), np.float32), "latlong")
+>>> cube = panorama.resample("cube", 32).mips()
+>>> cube.levels, cube.level(5).shape
+(6, (6, 1, 1, 3))
+>>> cube.sample([0.0, 1.0, 0.0]).tolist()
+[1.0, 1.0, 1.0]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import fspath
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mirrorbake import _core
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["EnvMap"]
+
+_NAMES = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}
+
+
+@dataclass(frozen=True, eq=False)
+class EnvMap:
+    """An environment map in one block of float32 values: levels, faces, rows, columns, channels.
+
+    Attributes
+    ----------
+    layout
+        Projection, size, levels and channels.
+    values
+        The block, one-dimensional. `level` gives views of it.
+    channels
+        Names of the channels.
+    """
+
+    layout: _core.EnvMapLayout
+    values: NDArray[np.float32]
+    channels: list[str]
+
+    def __post_init__(self) -> None:
+        """Check that the parts agree."""
+        if self.values.size != self.layout.size:
+            raise ValueError(f"values has {self.values.size} numbers, expected {self.layout.size}")
+        if len(self.channels) != self.layout.channels:
+            raise ValueError(f"channels has {len(self.channels)} names, expected {self.layout.channels}")
+
+    @classmethod
+    def from_array(cls, array: ArrayLike, projection: str, channels: list[str] | None = None) -> EnvMap:
+        """See an array as a map, without a copy if it is C-contiguous float32.
+
+        Parameters
+        ----------
+        array
+            Shape (6, n, n, C) for a cube, (2, h, w, C) for a dual paraboloid, (h, w, C) otherwise.
+        projection
+            Name of the projection.
+        channels
+            Names; by default Y, YA, RGB, RGBA, or numbers.
+        """
+        block = np.ascontiguousarray(array, np.float32)
+        faces = {"cube": 6, "dual_paraboloid": 2}.get(projection.partition(":")[0], 1)
+        expected = 4 if faces > 1 else 3
+        if block.ndim != expected or (faces > 1 and block.shape[0] != faces):
+            shape = f"({faces}, height, width, channels)" if faces > 1 else "(height, width, channels)"
+            raise ValueError(f"array has the shape {block.shape}, expected {shape} for {projection}")
+        height, width, count = block.shape[-3:]
+        layout = _core.EnvMapLayout(projection, width, height, 1, count)
+        names = channels or _NAMES.get(count) or [str(i) for i in range(count)]
+        return cls(layout, block.reshape(-1), names)
+
+    @classmethod
+    def load(
+        cls, path: str | PathLike[str], projection: str | None = None, *, faces: str = "automatic"
+    ) -> EnvMap:
+        """Read an EXR, HDR, TIFF, PNG, JPEG or KTX2.
+
+        Parameters
+        ----------
+        path
+            A ``{}`` in it stands for px, nx, py, ny, pz, nz: one image per face.
+        projection
+            By default found from the shape of the image.
+        faces
+            How faces share the image: strip, column, grid, cross, vertical_cross, or automatic.
+
+        Raises
+        ------
+        FileError
+            If there is no such file, or it is damaged, or its shape fits no projection.
+        """
+        layout, values, names = _core.load_envmap(fspath(path), projection, faces)
+        return cls(layout, values, names)
+
+    def save(
+        self, path: str | PathLike[str], *, faces: str = "automatic", format: str = "automatic"
+    ) -> _core.SaveReport:
+        """Write the finest level as an image, or all levels as KTX2, atomically."""
+        return _core.save_envmap(fspath(path), self.layout, self.values, self.channels, faces, format)
+
+    @property
+    def projection(self) -> str:
+        """Name of the projection."""
+        return self.layout.projection
+
+    @property
+    def levels(self) -> int:
+        """Number of levels."""
+        return self.layout.levels
+
+    def level(self, index: int = 0) -> NDArray[np.float32]:
+        """View of a level: (6, n, n, C), (2, h, w, C) or (h, w, C)."""
+        if not 0 <= index < self.levels:
+            raise IndexError(f"level is {index}, expected 0 to {self.levels - 1}")
+        block = self.values[self.layout.level_offset(index) : self.layout.level_offset(index + 1)]
+        shape = (self.layout.level_height(index), self.layout.level_width(index), self.layout.channels)
+        return block.reshape((self.layout.faces, *shape) if self.layout.faces > 1 else shape)
+
+    def resample(
+        self,
+        projection: str,
+        size: int | tuple[int, int],
+        *,
+        filter: str = "automatic",
+        source_from_target: ArrayLike | None = None,
+    ) -> EnvMap:
+        """Return the finest level in another projection and size.
+
+        Parameters
+        ----------
+        projection
+            Name of the projection to make.
+        size
+            Height of a face, or (height, width). A latlong is twice as wide as it is high.
+        filter
+            ``area``: exact mean over the area of a texel; ``bilinear``; ``nearest``; ``automatic``: area where the map
+            shrinks, interpolation where it grows.
+        source_from_target
+            Rotation or reflection of directions, 3×3.
+        """
+        if isinstance(size, int):
+            size = (size, 2 * size if projection == "latlong" else size)
+        height, width = size
+        matrix = np.eye(3, dtype=np.float32) if source_from_target is None else source_from_target
+        matrix = np.ascontiguousarray(matrix, np.float32)
+        values = _core.resample(self.layout, self.values, projection, width, height, filter, matrix)
+        return EnvMap(
+            _core.EnvMapLayout(projection, width, height, 1, self.layout.channels), values, self.channels
+        )
+
+    def mips(self, filter: str = "seamless") -> EnvMap:
+        """All levels down to 1×1, by ``box``, ``solid_angle`` or ``seamless``."""
+        values = _core.build_mips(self.layout, self.values, filter)
+        width, height = self.layout.width, self.layout.height
+        levels = _core.full_level_count(width, height)
+        layout = _core.EnvMapLayout(self.projection, width, height, levels, self.layout.channels)
+        return EnvMap(layout, values, self.channels)
+
+    def seam(self, level: int = 0) -> tuple[float, float]:
+        """Largest step between neighbouring texels across edges of faces, and inside of faces."""
+        return _core.measure_seam(self.layout, self.values, level)
+
+    def with_border(self, border: int, level: int = 0) -> NDArray[np.float32]:
+        """Faces of a level with ``border`` texels of their neighbours around: (faces, height, width, C)."""
+        return _core.add_border(self.layout, self.values, level, border)
+
+    def sample(
+        self,
+        directions: ArrayLike,
+        ddx: ArrayLike | None = None,
+        ddy: ArrayLike | None = None,
+        *,
+        filter: str = "bilinear",
+        max_anisotropy: float = 16.0,
+    ) -> NDArray[np.float32]:
+        """Values (..., C) in directions (..., 3).
+
+        ``trilinear`` and ``ewa`` need the differentials of the directions over a pixel, of the same shape.
+
+        Raises
+        ------
+        InvalidArgument
+            For NaN, infinite and zero directions, and for missing differentials.
+        """
+        array = np.asarray(directions, np.float32)
+
+        def vectors(a: ArrayLike | None) -> NDArray[np.float32] | None:
+            return (
+                None if a is None else np.broadcast_to(np.asarray(a, np.float32), array.shape).reshape(-1, 3)
+            )
+
+        values = _core.sample(
+            self.layout, self.values, array.reshape(-1, 3), vectors(ddx), vectors(ddy), filter, max_anisotropy
+        )
+        return values.reshape((*array.shape[:-1], self.layout.channels))
+
+    def to_convention(self, name: str) -> EnvMap:
+        """Return the map as openexr, oiio, mitsuba, threejs or ktx2 orient it. One level only."""
+        return self._converted(name, to_foreign=True)
+
+    def from_convention(self, name: str) -> EnvMap:
+        """Return our map of one that is oriented as by openexr, oiio, mitsuba, threejs or ktx2. One level only."""
+        return self._converted(name, to_foreign=False)
+
+    def _converted(self, name: str, *, to_foreign: bool) -> EnvMap:
+        values = _core.convert_convention(self.layout, self.values, name, to_foreign)
+        return EnvMap(self.layout, values, self.channels)
+
+    def flux(self, level: int = 0) -> NDArray[np.float64]:
+        """∫ L dω per channel, in radiance times steradian."""
+        return np.asarray(_core.integrate(self.layout, self.values, level))
+
+    def compare(self, reference: EnvMap) -> _core.Comparison:
+        """Errors of the finest level against a reference of the same layout."""
+        return _core.compare_envmaps(self.layout, self.values, reference.layout, reference.values)

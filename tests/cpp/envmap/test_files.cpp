@@ -1,0 +1,283 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/sampling.hpp"
+#include "mirrorbake/envmap/compare.hpp"
+#include "mirrorbake/envmap/conventions.hpp"
+#include "mirrorbake/envmap/envmap_io.hpp"
+#include "mirrorbake/envmap/ktx2.hpp"
+#include "mirrorbake/envmap/mipmap.hpp"
+#include "mirrorbake/image/atomic_file.hpp"
+#include "mirrorbake/image/half.hpp"
+
+namespace mirrorbake {
+namespace {
+
+namespace fs = std::filesystem;
+
+class EnvMapFiles : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("mirrorbake_envmap_files_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  fs::path folder_;
+};
+
+// Every texel holds the direction of its centre: what a labelled picture shows, to every texel.
+EnvMap directions(const char* projection, int width, int height) {
+  EnvMap map = make_envmap({parse_projection(projection), width, height, 1, 3}, default_channels(3));
+  for (int face = 0; face < face_count(map.layout.projection); ++face) {
+    for (int row = 0; row < height; ++row) {
+      for (int column = 0; column < width; ++column) {
+        const glm::dvec3 d = direction_from_point(map.layout.projection, face, column_center(column, width),
+                                                  row_center(row, height));
+        for (int c = 0; c < 3; ++c) {
+          map.values[map.layout.index(0, face, row, column) + static_cast<std::size_t>(c)] =
+              static_cast<float>(d[c]);
+        }
+      }
+    }
+  }
+  return map;
+}
+
+TEST(Half, EveryFiniteHalfSurvivesAndNeighboursRoundToEven) {
+  for (std::uint32_t bits = 0; bits < 65536; ++bits) {
+    const std::uint16_t half = static_cast<std::uint16_t>(bits);
+    const float value = float_from_half(half);
+    if (std::isnan(value)) {
+      EXPECT_TRUE(std::isnan(float_from_half(half_from_float(value))));
+      continue;
+    }
+    EXPECT_EQ(half_from_float(value), half);
+    // Half way to the next larger magnitude: to the even one.
+    const float next = float_from_half(static_cast<std::uint16_t>(bits + 1));
+    if ((bits & 0x7fffu) < 0x7bffu) {
+      EXPECT_EQ(half_from_float(0.5F * (value + next)) & 1u, 0u) << bits;
+      EXPECT_EQ(half_from_float(std::nextafter(0.5F * (value + next), value)), half) << bits;
+    }
+  }
+  EXPECT_EQ(half_from_float(65519.0F), 0x7bffu);
+  EXPECT_EQ(half_from_float(65520.0F), 0x7c00u);
+  EXPECT_EQ(half_from_float(1e-10F), 0u);
+}
+
+TEST_F(EnvMapFiles, Ktx2ReturnsEveryLevelRoundedToHalf) {
+  for (const int channels : {1, 2, 3, 4}) {
+    EnvMap map = make_envmap({parse_projection("cube"), 20, 20, 1, channels});
+    for (std::size_t i = 0; i < map.values.size(); ++i) {
+      map.values[i] = 100.0F * unit_float(static_cast<std::uint32_t>(hash64(i)));
+    }
+    const EnvMap mips = build_mips(map, MipFilter::seamless);
+    EXPECT_EQ(save_ktx2(path("a.ktx2"), mips).clamped_to_half, 0u);
+    const EnvMap again = load_envmap(path("a.ktx2"));
+    ASSERT_EQ(again.layout.levels, mips.layout.levels);
+    ASSERT_EQ(again.layout.channels, channels == 3 ? 4 : channels);
+    const std::size_t texels = mips.values.size() / static_cast<std::size_t>(channels);
+    for (std::size_t i = 0; i < texels; ++i) {
+      for (int c = 0; c < again.layout.channels; ++c) {
+        const float expected =
+            c < channels ? mips.values[i * static_cast<std::size_t>(channels) + static_cast<std::size_t>(c)]
+                         : 1.0F;
+        EXPECT_EQ(
+            again.values[i * static_cast<std::size_t>(again.layout.channels) + static_cast<std::size_t>(c)],
+            float_from_half(half_from_float(expected)));
+      }
+    }
+  }
+}
+
+TEST_F(EnvMapFiles, Ktx2ClampsAndCounts) {
+  EnvMap map = make_envmap({parse_projection("cube"), 1, 1, 1, 1});
+  map.values = {1e6F, -1e6F, std::numeric_limits<float>::infinity(), 65504.0F, 0.0F, 1.0F};
+  EXPECT_EQ(save_ktx2(path("a.ktx2"), map).clamped_to_half, 3u);
+  EXPECT_EQ(load_ktx2(path("a.ktx2")).values,
+            (std::vector<float>{65504.0F, -65504.0F, 65504.0F, 65504.0F, 0.0F, 1.0F}));
+  EXPECT_THROW(save_ktx2(path("b.ktx2"), directions("latlong", 8, 4)), InvalidArgument);
+}
+
+TEST_F(EnvMapFiles, DamagedKtx2FilesAreErrorsAndNeverCrash) {
+  save_ktx2(path("whole.ktx2"), build_mips(directions("cube", 8, 8), MipFilter::box));
+  std::ifstream in(path("whole.ktx2"), std::ios::binary);
+  const std::vector<char> text((std::istreambuf_iterator<char>(in)), {});
+  std::vector<std::byte> bytes(text.size());
+  std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
+  for (std::size_t length = 0; length < bytes.size(); length += 37) {
+    write_file(path("broken.ktx2"), std::span(bytes).first(length));
+    EXPECT_THROW(load_envmap(path("broken.ktx2")), FileError) << length;
+  }
+  int loaded = 0;
+  for (std::uint64_t trial = 0; trial < 2000; ++trial) {
+    std::vector<std::byte> changed = bytes;
+    for (std::uint64_t i = 0; i < 1 + trial % 4; ++i) {
+      changed[12 + hash64(trial, 2 * i) % 300] = static_cast<std::byte>(hash64(trial, 2 * i + 1) & 255u);
+    }
+    write_file(path("broken.ktx2"), changed);
+    try {
+      const EnvMap map = load_ktx2(path("broken.ktx2"), {.max_bytes = 1 << 24});
+      EXPECT_EQ(map.values.size(), map.layout.size());
+      ++loaded;
+    } catch (const FileError&) {
+    }
+  }
+  EXPECT_LT(loaded, 2000);
+}
+
+TEST_F(EnvMapFiles, EveryFaceLayoutComesBackAndIsRecognisedByItsShape) {
+  const EnvMap cube = directions("cube", 6, 6);
+  for (const FaceLayout layout : {FaceLayout::strip, FaceLayout::column, FaceLayout::grid, FaceLayout::cross,
+                                  FaceLayout::vertical_cross}) {
+    save_envmap(path("cube.exr"), cube, layout, PixelFormat::float32);
+    EXPECT_EQ(load_envmap(path("cube.exr")).values, cube.values) << to_string(layout);
+    EXPECT_EQ(load_envmap(path("cube.exr"), cube.layout.projection, layout).values, cube.values)
+        << to_string(layout);
+    EXPECT_EQ(parse_face_layout(to_string(layout)), layout);
+  }
+  save_envmap(path("cube_{}.exr"), cube, FaceLayout::files, PixelFormat::float32);
+  EXPECT_TRUE(fs::exists(path("cube_nz.exr")));
+  EXPECT_EQ(load_envmap(path("cube_{}.exr")).values, cube.values);
+
+  const EnvMap paraboloid = directions("dual_paraboloid", 5, 5);
+  for (const FaceLayout layout : {FaceLayout::strip, FaceLayout::column}) {
+    save_envmap(path("pair.exr"), paraboloid, layout, PixelFormat::float32);
+    EXPECT_EQ(load_envmap(path("pair.exr"), paraboloid.layout.projection).values, paraboloid.values);
+  }
+  const EnvMap panorama = directions("latlong", 8, 4);
+  save_envmap(path("panorama.exr"), panorama, FaceLayout::automatic, PixelFormat::float32);
+  EXPECT_EQ(load_envmap(path("panorama.exr")).layout, panorama.layout);
+}
+
+// Texels that touch in a cross touch on the sphere: their directions differ by no more than a texel's size.
+TEST_F(EnvMapFiles, FacesThatTouchInACrossTouchOnTheSphere) {
+  for (const FaceLayout layout : {FaceLayout::cross, FaceLayout::vertical_cross}) {
+    const Image image = pack_faces(directions("cube", 16, 16), 0, layout);
+    int joints = 0;
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        const auto at = [&](int i, int j) {
+          return glm::vec3(image.at(i, j)[0], image.at(i, j)[1], image.at(i, j)[2]);
+        };
+        const auto check = [&](int i, int j) {
+          if (i >= image.width || j >= image.height || glm::length(at(x, y)) == 0.0F ||
+              glm::length(at(i, j)) == 0.0F)
+            return;
+          EXPECT_LT(glm::length(at(x, y) - at(i, j)), 2.0F / 16 + 1e-6F) << x << ' ' << y;
+          ++joints;
+        };
+        check(x + 1, y);
+        check(x, y + 1);
+      }
+    }
+    EXPECT_GT(joints, 6 * 2 * 15 * 16);
+  }
+}
+
+TEST_F(EnvMapFiles, ShapesThatFitNothingAreErrorsThatNameTheFile) {
+  save_image(path("odd.exr"), Image(7, 5, default_channels(3)));
+  try {
+    load_envmap(path("odd.exr"));
+    FAIL() << "no error";
+  } catch (const FileError& e) {
+    EXPECT_THAT(e.what(), testing::AllOf(testing::HasSubstr("odd.exr"), testing::HasSubstr("7 x 5")));
+  }
+  EXPECT_THROW(load_envmap(path("odd.exr"), parse_projection("cube")), FileError);
+  EXPECT_EQ(load_envmap(path("odd.exr"), parse_projection("angular")).layout.width, 7);
+}
+
+// Directions per convention, from the documentation or source of each program: centre, right edge of the right
+// quarter, top of its panorama.
+TEST(Conventions, PanoramasLookWhereEachProgramLooks) {
+  struct Case {
+    const char* name;
+    glm::vec3 center, right, up;
+  };
+  for (const Case& c :
+       {Case{"mirrorbake", {0, 0, -1}, {1, 0, 0}, {0, 1, 0}},
+        Case{"openexr", {0, 0, 1}, {-1, 0, 0}, {0, 1, 0}}, Case{"mitsuba", {0, 0, 1}, {-1, 0, 0}, {0, 1, 0}},
+        Case{"oiio", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, Case{"threejs", {1, 0, 0}, {0, 0, 1}, {0, 1, 0}}}) {
+    const EnvMap foreign =
+        convert_convention(directions("latlong", 64, 32), c.name, ConventionWay::to_foreign);
+    const auto at = [&](int row, int column) {
+      const float* texel = foreign.values.data() + foreign.layout.index(0, 0, row, column);
+      return glm::vec3(texel[0], texel[1], texel[2]);
+    };
+    // The four texels around a point average to its direction, shortened a little.
+    const auto around = [&](int row, int column) {
+      return 0.25F * (at(row, column) + at(row - 1, column) + at(row, column - 1) + at(row - 1, column - 1));
+    };
+    EXPECT_LT(glm::length(around(16, 32) - c.center), 0.02F) << c.name;
+    EXPECT_LT(glm::length(around(16, 48) - c.right), 0.02F) << c.name;
+    EXPECT_LT(glm::length(at(0, 5) - c.up), 0.1F) << c.name;
+  }
+}
+
+TEST(Conventions, CubesGoThereAndBackExactly) {
+  const EnvMap cube = directions("cube", 8, 8);
+  for (const char* name : {"mirrorbake", "openexr", "threejs", "ktx2"}) {
+    const EnvMap there = convert_convention(cube, name, ConventionWay::to_foreign);
+    EXPECT_EQ(convert_convention(there, name, ConventionWay::from_foreign).values, cube.values) << name;
+  }
+  EXPECT_THROW(convert_convention(cube, "oiio", ConventionWay::to_foreign), InvalidArgument);
+  EXPECT_THROW(convert_convention(cube, "blender", ConventionWay::to_foreign), InvalidArgument);
+  const EnvMap panorama = directions("latlong", 16, 8);
+  for (const char* name : {"openexr", "mitsuba", "threejs"}) {
+    const EnvMap there = convert_convention(panorama, name, ConventionWay::to_foreign);
+    EXPECT_EQ(convert_convention(there, name, ConventionWay::from_foreign).values, panorama.values) << name;
+  }
+}
+
+// ImfEnvmap.cpp of OpenEXR (CubeMap::pixelPosition): the top of ±X and ±Z is +y, of +Y it is +z, of −Y −z; to the
+// right of +X is +z, of −X −z, of ±Y +x, of +Z −x, of −Z +x.
+TEST(Conventions, OpenExrFacesAreOrientedAsInItsHeader) {
+  const EnvMap exr = convert_convention(directions("cube", 8, 8), "openexr", ConventionWay::to_foreign);
+  const auto at = [&](int face, int row, int column) {
+    const float* texel = exr.values.data() + exr.layout.index(0, face, row, column);
+    const glm::vec3 d(texel[0], texel[1], texel[2]);
+    return d / std::max(std::max(std::abs(d.x), std::abs(d.y)), std::abs(d.z));
+  };
+  const float right = 0.625F;  // centre of column 6 of 8
+  const float up = 0.875F;     // centre of row 0
+  const glm::vec3 expected[6] = {{1, up, right},   {-1, up, -right}, {right, 1, up},
+                                 {right, -1, -up}, {-right, up, 1},  {right, up, -1}};
+  for (int face = 0; face < 6; ++face) {
+    EXPECT_LT(glm::length(at(face, 0, 6) - expected[face]), 1e-5F) << "face " << face;
+  }
+}
+
+TEST(Compare, MeasuresKnownDifferences) {
+  EnvMap a = make_envmap({parse_projection("cube"), 4, 4, 1, 1});
+  EnvMap b = a;
+  std::fill(a.values.begin(), a.values.end(), 1.1F);
+  std::fill(b.values.begin(), b.values.end(), 1.0F);
+  const Comparison c = compare(a, b);
+  EXPECT_NEAR(c.max_error, 0.1, 1e-6);
+  EXPECT_NEAR(c.mean_error, 0.1, 1e-6);
+  EXPECT_NEAR(c.rms_error, 0.1, 1e-6);
+  EXPECT_NEAR(c.relative_l2, 0.1, 1e-6);
+  EXPECT_NEAR(c.psnr, 20.0, 1e-4);
+  EXPECT_NEAR(c.flux_ratio, 1.1, 1e-6);
+  EXPECT_EQ(compare(a, a).psnr, std::numeric_limits<double>::infinity());
+  a.values[3] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(compare(a, b).not_finite, 1u);
+  EXPECT_NEAR(compare(a, b).mean_error, 0.1, 1e-6);
+  EXPECT_THROW(compare(a, directions("latlong", 4, 4)), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace mirrorbake

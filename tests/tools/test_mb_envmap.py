@@ -1,0 +1,206 @@
+"""mb-envmap from the outside: what it prints, what it writes, how it fails."""
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mirrorbake.envmap import EnvMap
+
+ROOT = Path(__file__).parents[2]
+NAME = "mb-envmap"
+BUILDS = [os.environ.get("MIRRORBAKE_TOOLS", ""), *(ROOT / "build").glob("*/cpp/tools")]
+FOUND = [Path(folder) / NAME for folder in BUILDS if folder and (Path(folder) / NAME).is_file()]
+
+pytestmark = pytest.mark.skipif(
+    not FOUND, reason=f"{NAME} is not built: cmake --build --preset dev --target {NAME}"
+)
+
+
+def mb_envmap(*arguments: object, status: int = 0) -> str:
+    newest = max(FOUND, key=lambda path: path.stat().st_mtime)
+    done = subprocess.run(
+        [newest, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == status, done.stderr
+    if status != 0:
+        assert done.stdout == ""
+        assert done.stderr.strip()
+        return done.stderr
+    return done.stdout
+
+
+@pytest.fixture
+def panorama(tmp_path: Path) -> Path:
+    path = tmp_path / "panorama.exr"
+    values = np.random.default_rng(5).random((32, 64, 3), np.float32)
+    EnvMap.from_array(values, "latlong").save(path, format="float32")
+    return path
+
+
+def test_info_measures_the_map(panorama: Path) -> None:
+    info = json.loads(mb_envmap("info", panorama, "--json"))
+    assert (info["projection"], info["width"], info["height"], info["channels"]) == (
+        "latlong",
+        64,
+        32,
+        ["R", "G", "B"],
+    )
+    assert info["mean_radiance"] == pytest.approx(EnvMap.load(panorama).flux() / (4 * np.pi))
+    assert "latlong" in mb_envmap("info", panorama)
+
+
+def test_convert_does_what_the_library_does(panorama: Path, tmp_path: Path) -> None:
+    out = tmp_path / "cube.exr"
+    mb_envmap(
+        "convert",
+        panorama,
+        "--to",
+        "cube",
+        "--size",
+        16,
+        "--layout",
+        "cross",
+        "--format",
+        "float32",
+        "-o",
+        out,
+    )
+    expected = EnvMap.load(panorama).resample("cube", 16)
+    np.testing.assert_array_equal(EnvMap.load(out).values, expected.values)
+    mb_envmap(
+        "convert",
+        panorama,
+        "--to",
+        "cube",
+        "--size",
+        "8",
+        "-o",
+        tmp_path / "face_{}.png",
+        "--layout",
+        "files",
+    )
+    assert len(list(tmp_path.glob("face_*.png"))) == 6
+
+
+def test_turning_moves_what_lay_ahead_to_the_right(tmp_path: Path) -> None:
+    values = np.zeros((16, 32, 1), np.float32)
+    values[:, 14:18] = 1.0  # around −Z
+    EnvMap.from_array(values, "latlong").save(tmp_path / "in.exr")
+    mb_envmap(
+        "convert",
+        tmp_path / "in.exr",
+        "--to",
+        "latlong",
+        "--size",
+        16,
+        "--turn",
+        90,
+        "-o",
+        tmp_path / "out.exr",
+    )
+    turned = EnvMap.load(tmp_path / "out.exr")
+    assert turned.sample([1.0, 0.0, 0.0])[0] > 0.9
+    assert turned.sample([0.0, 0.0, -1.0])[0] < 0.1
+
+
+def test_mips_border_and_sample(panorama: Path, tmp_path: Path) -> None:
+    mb_envmap("convert", panorama, "--to", "cube", "--size", 16, "-o", tmp_path / "cube.exr")
+    mb_envmap("mips", tmp_path / "cube.exr", "-o", tmp_path / "cube.ktx2")
+    assert EnvMap.load(tmp_path / "cube.ktx2").levels == 5
+    mb_envmap("mips", tmp_path / "cube.exr", "-o", tmp_path / "level{}.exr")
+    assert len(list(tmp_path.glob("level*.exr"))) == 5
+    mb_envmap("border", tmp_path / "cube.exr", "--width", 2, "-o", tmp_path / "wide.exr")
+    line = json.loads(mb_envmap("sample", tmp_path / "cube.ktx2", "--direction", 0, 2, 0, "--json"))
+    expected = EnvMap.load(tmp_path / "cube.ktx2").sample([0.0, 2.0, 0.0])
+    assert line["value"] == pytest.approx(expected)
+
+
+def test_compare_finds_no_difference_and_a_known_one(panorama: Path, tmp_path: Path) -> None:
+    same = json.loads(mb_envmap("compare", panorama, panorama, "--json"))
+    assert (same["max_error"], same["psnr"], same["flux_ratio"]) == (0, None, 1)
+    brighter = EnvMap.from_array(EnvMap.load(panorama).level() * 2, "latlong")
+    brighter.save(tmp_path / "brighter.exr", format="float32")
+    found = json.loads(mb_envmap("compare", tmp_path / "brighter.exr", panorama, "--json"))
+    assert found["relative_l2"] == pytest.approx(1.0)
+    assert found["flux_ratio"] == pytest.approx(2.0)
+
+
+def test_errors_say_what_is_wrong_and_write_nothing(panorama: Path, tmp_path: Path) -> None:
+    before = sorted(tmp_path.iterdir())
+    out = tmp_path / "out.exr"
+    assert "does not exist" in mb_envmap("info", tmp_path / "none.exr", status=3)
+    assert "projection is globe" in mb_envmap("convert", panorama, "--to", "globe", "-o", out, status=3)
+    assert "--size is 12y" in mb_envmap(
+        "convert", panorama, "--to", "cube", "--size", "12y", "-o", out, status=3
+    )
+    assert "folder" in mb_envmap(
+        "convert", panorama, "--to", "cube", "-o", tmp_path / "no" / "out.exr", status=3
+    )
+    assert "KTX2" in mb_envmap("convert", panorama, "--to", "latlong", "-o", tmp_path / "a.ktx2", status=3)
+    mb_envmap("convert", panorama, "-o", out, status=2)
+    mb_envmap(status=2)
+    mb_envmap("info", panorama, "--threads", "-1", status=2)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_random_bytes_never_crash_it(panorama: Path, tmp_path: Path) -> None:
+    whole = bytearray(panorama.read_bytes())
+    rng = np.random.default_rng(7)
+    for trial in range(30):
+        data = bytearray(rng.bytes(400)) if trial % 3 == 0 else bytearray(whole)
+        if trial % 3:
+            for position in rng.integers(0, min(len(data), 400), 6):
+                data[position] = rng.integers(256)
+        path = tmp_path / "broken.exr"
+        path.write_bytes(data)
+        newest = max(FOUND, key=lambda p: p.stat().st_mtime)
+        done = subprocess.run([newest, "info", path], capture_output=True, timeout=60, check=False)
+        assert done.returncode in (0, 3), done.stderr
+
+
+def test_an_independent_reader_finds_every_level_of_a_ktx2(tmp_path: Path) -> None:
+    """Reads the file with ktx-parse, the reader of three.js and glTF-Transform."""
+    if shutil.which("node") is None or shutil.which("npm") is None:
+        pytest.skip("needs node and npm")
+    installed = subprocess.run(
+        ["npm", "install", "--silent", "--no-fund", "--no-audit", "--prefix", tmp_path, "ktx-parse@1"],
+        capture_output=True,
+        timeout=120,
+        check=False,
+    )
+    if installed.returncode != 0:
+        pytest.skip("npm cannot install ktx-parse")
+    values = np.random.default_rng(6).random((6, 8, 8, 3), np.float32)
+    mips = EnvMap.from_array(values, "cube").mips()
+    mips.save(tmp_path / "cube.ktx2")
+    (tmp_path / "read.mjs").write_text(
+        """
+        import { readFileSync } from 'node:fs';
+        import { read } from 'ktx-parse';
+        const k = read(new Uint8Array(readFileSync('cube.ktx2')));
+        const d = k.dataFormatDescriptor[0];
+        console.log(JSON.stringify({
+          format: k.vkFormat, width: k.pixelWidth, height: k.pixelHeight, faces: k.faceCount,
+          levels: k.levels.map(l => Buffer.from(l.levelData).toString('base64')),
+          transfer: d.transferFunction, samples: d.samples.length, keys: Object.keys(k.keyValue),
+        }));
+        """
+    )
+    done = subprocess.run(
+        ["node", "read.mjs"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
+    )
+    found = json.loads(done.stdout)
+    assert (found["format"], found["width"], found["height"], found["faces"]) == (97, 8, 8, 6)
+    assert (found["transfer"], found["samples"]) == (1, 4)
+    assert found["keys"] == ["KTXorientation", "KTXwriter"]
+    assert len(found["levels"]) == 4
+    for index, text in enumerate(found["levels"]):
+        texels = np.frombuffer(base64.b64decode(text), np.float16).reshape(*mips.level(index).shape[:3], 4)
+        np.testing.assert_array_equal(texels[..., :3], mips.level(index).astype(np.float16))
+        assert np.all(texels[..., 3] == 1)

@@ -23,9 +23,10 @@ inline void for_each_cosine(const T* __restrict c, T* __restrict f, std::size_t 
   }
 }
 
+// Too short to be worth the detour.
 template <typename T>
-void schlick_loop(const T* c, T r0, T* f, std::size_t count) {
-  for_each_cosine(c, f, count, [=](std::size_t, T cosine) { return schlick(cosine, r0); });
+void schlick_loop(const T* __restrict c, T r0, T* __restrict f, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) f[i] = schlick(clamp_cosine(c[i]), r0);
 }
 
 void dielectric_loop(const float* c, float k, float* f, std::size_t count) {

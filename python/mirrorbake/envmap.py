@@ -144,8 +144,8 @@ class EnvMap:
         size
             Height of a face, or (height, width). A latlong is twice as wide as it is high.
         filter
-            ``area``: exact mean over the area of a texel; ``bilinear``; ``nearest``; ``automatic``: area where the map
-            shrinks, interpolation where it grows.
+            ``area``: exact mean over the area of a texel; ``bilinear``; ``nearest``; ``automatic``: area
+            where the map shrinks, interpolation where it grows.
         source_from_target
             Rotation or reflection of directions, 3×3.
         """
@@ -210,7 +210,7 @@ class EnvMap:
         return self._converted(name, to_foreign=True)
 
     def from_convention(self, name: str) -> EnvMap:
-        """Return our map of one that is oriented as by openexr, oiio, mitsuba, threejs or ktx2. One level only."""
+        """Return our map of one that openexr, oiio, mitsuba, threejs or ktx2 orient. One level only."""
         return self._converted(name, to_foreign=False)
 
     def _converted(self, name: str, *, to_foreign: bool) -> EnvMap:

@@ -106,7 +106,7 @@ def solid_angle_density(projection: str, face: int, x: float, y: float) -> float
 def dual_paraboloid_texture_matrix(frame_from_map: ArrayLike, face: int) -> NDArray[np.float32]:
     """4×4 texture matrix of [EMT] eq. 9–12 for the front (0) or back (1) paraboloid.
 
-    Applied to (r, 1), r the unit reflection vector in the space of ``frame_from_map`` (3×3, orthonormal), it gives
-    (s q, t q, ·, q), with t downwards.
+    Applied to (r, 1), r the unit reflection vector in the space of ``frame_from_map`` (3×3, orthonormal), it
+    gives (s q, t q, ·, q), with t downwards.
     """
     return _core.dual_paraboloid_texture_matrix(np.ascontiguousarray(frame_from_map, np.float32), face)

@@ -28,7 +28,8 @@ SUBSET = 32  # rows of each face that the reference looks at
 
 def background(d: NDArray[np.floating]) -> FloatArray:
     wave = 0.55 + 0.45 * np.sin(d @ np.array([5.0, 3.0, 2.0]))
-    return (wave[..., None] * np.array([1.0, 0.8, 0.6])).astype(np.float32)
+    colour: FloatArray = (wave[..., None] * np.array([1.0, 0.8, 0.6])).astype(np.float32)
+    return colour
 
 
 def panorama(height: int, *, lights: bool) -> EnvMap:
@@ -55,8 +56,9 @@ def mean_over_texels(source: EnvMap, size: int, face: int, rows: range) -> NDArr
     row = np.minimum(((1 - points[..., 1]) / 2 * height).astype(int), height - 1)
     values = image[row, column] * weight[..., None]
     shape = (len(rows), PLACES, size, PLACES)
-    total = values.reshape(*shape, 3).sum((1, 3))
-    return total / weight.reshape(shape).sum((1, 3))[..., None]
+    total: NDArray[np.float64] = values.reshape(*shape, 3).sum((1, 3))
+    mean: NDArray[np.float64] = total / weight.reshape(shape).sum((1, 3))[..., None]
+    return mean
 
 
 def relative_l2(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:

@@ -7,6 +7,7 @@ Times are scaled to equal error: a renderer with half the variance at the same t
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -106,6 +107,9 @@ def cases() -> Iterator[Case]:
     # The lamp's caustics are fireflies at this number of samples: the worst 1 % of the pixels are left out.
     reference = np.mean([ours(1000 + i) for i in range(REFERENCE_SEEDS)], axis=0)
 
+    def peers(scene: Any) -> Any:
+        return np.array(mi.render(scene, spp=SAMPLES, seed=1))
+
     def error(image: Any) -> float:
         square = ((image - reference) / np.maximum(reference, 0.01)) ** 2
         return float(np.sqrt(np.sort(square, axis=None)[: int(0.99 * square.size)].mean()))
@@ -118,13 +122,13 @@ def cases() -> Iterator[Case]:
             mi.set_variant(variant)
             with tempfile.TemporaryDirectory() as folder:
                 scene = mi.load_dict(mitsuba_scene(ball, Path(folder)))
-            image = np.array(mi.render(scene, spp=SAMPLES, seed=1))
+            image = peers(scene)
         except (ImportError, RuntimeError):
             continue  # no LLVM on this machine
         bias = abs(float(np.median(image / np.maximum(our_image, 1e-3))) - 1)
         require(bias < 0.02, f"the median pixel is {bias:.1%} off")
         peer_error = error(image)
-        peer_time = seconds(lambda scene=scene: np.array(mi.render(scene, spp=SAMPLES, seed=1)), 3)
+        peer_time = seconds(partial(peers, scene), 3)
         yield Case(
             case=f"path-traced room, {SIZE}² pixels, time to our error at {SAMPLES} samples",
             unit="s per image",

@@ -89,7 +89,7 @@ def test_lookups_find_the_direction_that_was_stored(projection: str, filter: str
 def test_lookups_refuse_what_has_no_answer() -> None:
     envmap = noise("cube", 4)
     with pytest.raises(ValueError, match="2 NaN, infinite or zero"):
-        envmap.sample([[0, 0, 0], [np.nan, 0, 1], [1, 0, 0]])
+        envmap.sample([[0.0, 0.0, 0.0], [np.nan, 0.0, 1.0], [1.0, 0.0, 0.0]])
     with pytest.raises(ValueError, match="ddx, ddy"):
         envmap.sample([1.0, 0, 0], filter="ewa")
     assert envmap.sample([1.0, 0, 0]).shape == (3,)

@@ -1,6 +1,7 @@
 """Fresnel reflectance against 50-digit arithmetic, and the Python side of it."""
 
 import itertools
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -45,7 +46,7 @@ def check(result: float, expected: mpmath.mpf, dtype: type[np.floating], what: o
 EXTREME_COSINES = [0.0, 1e-45, 1e-30, 1e-7, 1e-3, 0.5, 1 - 1e-7, 1.0]
 EXTREME_INDICES = [1e-6, 0.01, 0.66, 1 - 1e-7, 1.0, 1 + 1e-7, 1.0001, 1.049, 1.05, 1.5, 200.0, 1e6, 1e19]
 EXTREME_K = [0.0, 1e-30, 1e-7, 1e-3, 0.7, 3.0, 1e3, 1e6]
-DTYPES = [np.float32, np.float64]
+DTYPES: list[type[np.floating[Any]]] = [np.float32, np.float64]
 
 
 @pytest.mark.parametrize("dtype", DTYPES)

@@ -28,7 +28,7 @@ def test_directions_survive_a_round_trip_within_2e_7_radians(name: str, directio
 @pytest.mark.parametrize("name", [*PROJECTIONS, "sphere_map", "fisheye:90"])
 def test_directions_without_an_answer_are_errors(name: str, bad: list[float]) -> None:
     with pytest.raises(ValueError, match="1 NaN, infinite or zero vectors"):
-        pr.points_from_directions(name, [bad, [1, 0, 0]])
+        pr.points_from_directions(name, [bad, [1.0, 0.0, 0.0]])
 
 
 def test_bad_positions_are_errors() -> None:

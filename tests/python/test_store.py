@@ -59,7 +59,8 @@ def make_view(seed: int) -> tuple[dict[tuple[str, str], np.ndarray], ViewImages]
     }
     images = ViewImages(
         object=random.random((HEIGHT, WIDTH, 3), np.float32),
-        coverage=np.round(random.random((HEIGHT, WIDTH), np.float32) * 16) / 16,
+        coverage=np.round(random.random((HEIGHT, WIDTH), np.float32) * 16).astype(np.float32)
+        / np.float32(16),
         background=random.random((HEIGHT, WIDTH, 3), np.float32),
     )
     return maps, images
@@ -135,7 +136,7 @@ def test_a_view_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
     fill(make_store(tmp_path))
-    group = zarr.open_group(tmp_path / GROUP_NAME, mode="r")
+    group: Any = zarr.open_group(tmp_path / GROUP_NAME, mode="r")
     attributes: Any = group.attrs["mirrorbake"]
     assert attributes["format_version"] == 1
     sizes = attributes["conventions"]["level_sizes"]

@@ -99,7 +99,7 @@ def add_room(twin: Twin) -> None:
     twin.lamp((-0.5, 3.9, -0.5), (1, 0, 0), (0, 0, 1), 12.0)
 
 
-IN_ROOM = {"eye": (0.3, 2.2, 1.8), "target": (0.0, 1.0, 0.0)}
+IN_ROOM: dict[str, Any] = {"eye": (0.3, 2.2, 1.8), "target": (0.0, 1.0, 0.0)}
 
 
 def box_room(directory: Path) -> Twin:

@@ -15,7 +15,7 @@ from mirrorbake.envmap import EnvMap
 ROOT = Path(__file__).parents[2]
 NAME = "mb-envmap"
 BUILDS = [os.environ.get("MIRRORBAKE_TOOLS", ""), *(ROOT / "build").glob("*/cpp/tools")]
-FOUND = [Path(folder) / NAME for folder in BUILDS if folder and (Path(folder) / NAME).is_file()]
+FOUND = [Path(folder) / NAME for folder in map(str, BUILDS) if folder and (Path(folder) / NAME).is_file()]
 
 pytestmark = pytest.mark.skipif(
     not FOUND, reason=f"{NAME} is not built: cmake --build --preset dev --target {NAME}"

@@ -94,7 +94,7 @@ def _cosines(dtype: type[np.floating[Any]], count: int) -> Any:
 
 def _rounding(count: int) -> list[dict[str, Any]]:
     """Error curves of both precisions against mpmath."""
-    import mpmath  # type: ignore[import-untyped]
+    import mpmath
 
     def exact(c: float, n: complex) -> Any:
         cosine, index = mpmath.mpf(c), mpmath.mpc(n)

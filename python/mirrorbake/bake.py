@@ -170,7 +170,7 @@ class _Pilot:
 def _run_pilot(stage: Stage) -> _Pilot:
     config, built = stage.config, stage.built
     width, height = config.views.size
-    shrink = min(1.0, PILOT_SIDE / max(width, height))
+    shrink = PILOT_SIDE / max(width, height)
     options = stage.options
     options.samples_per_pixel = 1
     local = np.zeros(len(built.part_names), bool)

@@ -1,7 +1,7 @@
 """The command line. Data goes to stdout, progress and messages to stderr.
 
 Exit status: 0 success, 2 wrong usage, 3 bad input, 4 a computation that cannot give an answer, 130
-interrupted.
+interrupted. Commands import what they need themselves: `--help` should not wait for Zarr and matplotlib.
 """
 
 from __future__ import annotations
@@ -22,18 +22,15 @@ from rich.progress import (
 )
 
 from mirrorbake import _core
-from mirrorbake.bake import ProgressReport, bake
 from mirrorbake.command import reports_errors
-from mirrorbake.config import load_config, parse_override
-from mirrorbake.demo import run_demo
 from mirrorbake.errors import InputError
-from mirrorbake.evaluate import METRICS_NAME, evaluate
-from mirrorbake.render import render
-from mirrorbake.report import metrics_table
 from mirrorbake.study import app as study_app
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from mirrorbake.bake import ProgressReport
+    from mirrorbake.evaluate import Evaluation
 
 app = typer.Typer(
     name="mirrorbake",
@@ -78,10 +75,23 @@ def _parse_size(text: str) -> list[int]:
 
 
 def _parse_set(text: str) -> tuple[tuple[str, ...], Any]:
+    from mirrorbake.config import parse_override
+
     try:
         return parse_override(text)
     except InputError as failure:
         raise typer.BadParameter(str(failure)) from None
+
+
+def _print_figures(evaluation: Evaluation, json: bool) -> None:
+    from mirrorbake.report import metrics_table
+
+    if json:
+        typer.echo(evaluation.to_json(), nl=False)
+    else:
+        console = Console(highlight=False)
+        # A pipe or a log has no width of its own; the table should not be squeezed into 80 columns there.
+        console.print(metrics_table(evaluation), width=None if console.is_terminal else 120)
 
 
 def _print_version(wanted: bool) -> None:
@@ -150,6 +160,9 @@ def bake_command(
     threads: Threads = 0,
 ) -> None:
     """Bake a scene's reflections into one set of environment maps per view of the arc."""
+    from mirrorbake.bake import bake
+    from mirrorbake.config import load_config
+
     overrides = [_parse_set(text) for text in assignments or []]
     for key, value in (
         ("views.count", views),
@@ -180,14 +193,13 @@ def bake_command(
 @reports_errors
 def evaluate_command(directory: Folder, json: Json = False, threads: Threads = 0) -> None:
     """Compare a PEM and static maps with ray tracing, on the sampled views and half-way between them."""
+    from mirrorbake.evaluate import METRICS_NAME, evaluate
+
     limit = _core.ThreadLimit(threads)
     with _progress() as add_bar:
         evaluation = evaluate(directory, add_bar("evaluate"))
     del limit
-    if json:
-        typer.echo(evaluation.to_json(), nl=False)
-    else:
-        Console(highlight=False).print(metrics_table(evaluation))
+    _print_figures(evaluation, json)
     messages.print(f"wrote {directory / METRICS_NAME}", markup=False, soft_wrap=True)
 
 
@@ -208,6 +220,8 @@ def render_command(
     threads: Threads = 0,
 ) -> None:
     """Draw a PEM at any parameter of its arc, blended between the neighbouring views."""
+    from mirrorbake.render import render
+
     limit = _core.ThreadLimit(threads)
     render(directory, view, out)
     del limit
@@ -224,15 +238,14 @@ def demo_command(
     threads: Threads = 0,
 ) -> None:
     """Bake and evaluate a small teapot scene: about a minute on two cores."""
+    from mirrorbake.demo import run_demo
+
     limit = _core.ThreadLimit(threads)
     with _progress() as add_bar:
         evaluation, sheet = run_demo(out, add_bar)
     del limit
-    if json:
-        typer.echo(evaluation.to_json(), nl=False)
-    else:
-        Console(highlight=False).print(metrics_table(evaluation))
-    messages.print(f"wrote {out / METRICS_NAME} and {sheet}", markup=False, soft_wrap=True)
+    _print_figures(evaluation, json)
+    messages.print(f"wrote {sheet}", markup=False, soft_wrap=True)
 
 
 def main() -> None:

@@ -1022,7 +1022,7 @@ def build_cube_pyramid(faces: Annotated[NDArray[numpy.float32], dict(shape=(6, N
 class LookupOptions:
     """How a renderer reads the map."""
 
-    def __init__(self, *, footprint_scale: float = 0.5) -> None: ...
+    def __init__(self, *, footprint_scale: float = 0.25) -> None: ...
 
     @property
     def footprint_scale(self) -> float:
@@ -1088,7 +1088,7 @@ def display_row_weights(matrix: RenderingMatrix, samples_per_pixel: int, target:
 class SolveOptions:
     """Weights of the regulariser and when to stop."""
 
-    def __init__(self, *, smoothness: float = 0.0010000000474974513, level_agreement: float = 0.0010000000474974513, prior_weight: float = 0.009999999776482582, tolerance: float = 0.0010000000474974513, max_iterations: int = 200) -> None: ...
+    def __init__(self, *, smoothness: float = 0.0010000000474974513, level_agreement: float = 0.0010000000474974513, prior_weight: float = 0.0010000000474974513, tolerance: float = 0.0010000000474974513, max_iterations: int = 200) -> None: ...
 
     @property
     def smoothness(self) -> float:
@@ -1134,6 +1134,10 @@ class SolveReport:
     def iterations(self) -> int: ...
 
     @property
+    def rounds(self) -> int:
+        """Of the active set that keeps the map within its bounds."""
+
+    @property
     def relative_gradient(self) -> float:
         """What `tolerance` is compared with."""
 
@@ -1156,7 +1160,7 @@ class MapSolver:
         """
         Solves for a map.
 
-        target: float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior, initial: float32 (texels, C). Returns the map, float32 (texels, C), clamped to [0, inf) (coverage to [0, 1]), and a report.
+        target: float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior, initial: float32 (texels, C). Returns the map, float32 (texels, C), within [0, inf) (coverage in [0, 1]), and a report.
         """
 
 class PartMaps:

@@ -1,0 +1,158 @@
+"""The inference and the software run time from Python: one chain from traced samples to a drawn image."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import scipy.sparse
+
+import mirrorbake as mb
+from mirrorbake._core import Proxy
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SIZE = 40
+SAMPLES = 4
+LAYOUT = mb.CubePyramidLayout(16)
+PROXY = Proxy.box((0, 0, 0), (3, 2, 4))
+
+
+@pytest.fixture(scope="module")
+def trace() -> mb.LayerTrace:
+    """A mirror ball under a light, in a box of coloured walls."""
+    scene = mb.Scene()
+    mirror = scene.add_material(
+        mb.Material(
+            albedo=(0, 0, 0), specular=True, fresnel=mb.Fresnel(mb.FresnelModel.constant, r0=(1, 1, 1))
+        )
+    )
+    ball = scene.add_object("ball", mb.make_sphere((0, 0, 0), 1.0), mirror)
+    corners = [(-3, -2, -4), (3, -2, -4), (-3, -2, 4)]
+    edges = [((0, 4, 0), (0, 0, 8)), ((0, 0, 8), (0, 4, 0)), ((6, 0, 0), (0, 4, 0))]
+    for number, (corner, (u, v)) in enumerate(zip(corners, edges, strict=True)):
+        colour = tuple(0.8 if number == channel else 0.2 for channel in range(3))
+        wall = scene.add_material(mb.Material(albedo=colour, emission=colour))
+        scene.add_object(f"wall {number}", mb.make_rectangle(corner, u, v), wall)
+    tracer = mb.Tracer(scene, mb.TracerOptions(indirect=mb.IndirectLight.none))
+    camera = mb.Camera((0, 0.5, 3.5), (0, 0, 0), vertical_fov_degrees=45, width=SIZE, height=SIZE)
+    return tracer.trace_layers(camera, ball, mb.TraceOptions(samples_per_pixel=SAMPLES))
+
+
+@pytest.fixture(scope="module")
+def matrix(trace: mb.LayerTrace) -> mb.RenderingMatrix:
+    return mb.build_rendering_matrix(trace.samples, 0, PROXY, LAYOUT)
+
+
+def as_scipy(matrix: mb.RenderingMatrix) -> scipy.sparse.csr_array:
+    return scipy.sparse.csr_array(
+        (matrix.weights, matrix.texels, matrix.row_offsets.astype(np.int64)), (matrix.rows, matrix.columns)
+    )
+
+
+def random_map(channels: int) -> NDArray[np.float32]:
+    return np.random.default_rng(5).random((LAYOUT.texels, channels), np.float32)
+
+
+def test_layout_counts_the_texels_of_all_levels() -> None:
+    assert (LAYOUT.size, LAYOUT.levels) == (16, 5)
+    assert LAYOUT.texels == 6 * (256 + 64 + 16 + 4 + 1)
+    assert [LAYOUT.level_size(level) for level in range(5)] == [16, 8, 4, 2, 1]
+    assert LAYOUT.level_offset(2) == 6 * (256 + 64)
+    with pytest.raises(ValueError, match="size is 0"):
+        mb.CubePyramidLayout(0)
+
+
+def test_pyramid_of_a_constant_map_is_constant() -> None:
+    pyramid = mb.build_cube_pyramid(np.full((6, 16, 16, 3), 0.25, np.float32))
+    assert pyramid.shape == (LAYOUT.texels, 3)
+    np.testing.assert_allclose(pyramid, 0.25, rtol=1e-6)
+    with pytest.raises(ValueError, match="faces"):
+        mb.build_cube_pyramid(np.zeros((6, 16, 8, 3), np.float32))
+
+
+def test_rows_of_the_matrix_are_means(matrix: mb.RenderingMatrix) -> None:
+    assert matrix.rows > SIZE
+    assert matrix.nonzeros == matrix.texels.size == matrix.weights.size
+    np.testing.assert_allclose(as_scipy(matrix).sum(axis=1), 1.0, rtol=5e-6)
+    assert np.all(np.diff(matrix.row_pixels.astype(np.int64)) > 0)
+    assert matrix.row_samples.min() >= 1
+    assert matrix.row_samples.max() <= SAMPLES
+
+
+def test_multiply_is_the_sparse_product(matrix: mb.RenderingMatrix) -> None:
+    x = random_map(3)
+    np.testing.assert_allclose(matrix.multiply(x), as_scipy(matrix) @ x, rtol=1e-5)
+    with pytest.raises(ValueError, match="x is"):
+        matrix.multiply(x[1:])
+
+
+def test_average_is_the_mean_of_the_row(trace: mb.LayerTrace, matrix: mb.RenderingMatrix) -> None:
+    pixel = np.asarray(trace.samples.pixel, np.float32)[:, None]
+    np.testing.assert_array_equal(matrix.average(trace.samples, 0, pixel)[:, 0], matrix.row_pixels)
+
+
+def test_renderer_draws_what_the_matrix_says(trace: mb.LayerTrace, matrix: mb.RenderingMatrix) -> None:
+    x = random_map(3)
+    image = mb.render_reflector(trace.samples, [mb.PartMaps(PROXY, x)], LAYOUT)
+    drawn = image.reshape(-1, 4)[matrix.row_pixels]
+    coverage = matrix.row_samples[:, None] / SAMPLES
+    np.testing.assert_allclose(drawn[:, :3], coverage * matrix.multiply(x), rtol=1e-5)
+    np.testing.assert_allclose(drawn[:, 3:], coverage, rtol=1e-6)
+
+
+def test_inferred_map_reproduces_the_traced_reflection(
+    trace: mb.LayerTrace, matrix: mb.RenderingMatrix
+) -> None:
+    target = matrix.average(trace.samples, 0, np.asarray(trace.samples.distant))
+    weights = mb.display_row_weights(matrix, SAMPLES, target)
+    assert weights.shape == (matrix.rows,)
+    texels, report = mb.MapSolver(matrix, weights, LAYOUT).solve(target)
+    assert texels.shape == (LAYOUT.texels, 3)
+    assert report.iterations > 0
+    assert report.rounds >= 1
+    assert report.relative_gradient <= mb.SolveOptions().tolerance
+    assert 0 < report.unknowns <= LAYOUT.texels
+    # A constant is the best that a map of one texel could do; the walls differ by far more than the residue.
+    constant = np.sqrt(np.average((target - target.mean(axis=0)) ** 2))
+    assert report.rms_error < 0.35 * constant
+    image = mb.render_reflector(trace.samples, [mb.PartMaps(PROXY, texels)], LAYOUT)
+    drawn = image.reshape(-1, 4)[matrix.row_pixels, :3] * SAMPLES / matrix.row_samples[:, None]
+    assert np.sqrt(np.average((drawn - target) ** 2)) < 0.35 * constant
+
+
+def test_solver_starts_from_a_map_and_falls_back_to_a_prior(
+    trace: mb.LayerTrace, matrix: mb.RenderingMatrix
+) -> None:
+    prior = random_map(3)
+    target = matrix.multiply(prior)
+    weights = np.ones(matrix.rows, np.float32)
+    solver = mb.MapSolver(matrix, weights, LAYOUT, mb.SolveOptions(prior_weight=0.1))
+    texels, _ = solver.solve(target, prior=prior)
+    np.testing.assert_allclose(texels, prior, atol=1e-5)
+    _, cold = solver.solve(target)
+    best, _ = solver.solve(target)
+    _, warm = solver.solve(target, initial=best)
+    assert warm.iterations < cold.iterations
+
+
+def test_solver_names_what_is_wrong(matrix: mb.RenderingMatrix) -> None:
+    weights = np.ones(matrix.rows, np.float32)
+    target = np.ones((matrix.rows, 1), np.float32)
+    solver = mb.MapSolver(matrix, weights, LAYOUT)
+    target[3] = np.nan
+    with pytest.raises(mb.InvalidArgument, match="target is not finite in 1 values"):
+        solver.solve(target)
+    with pytest.raises(mb.InvalidArgument, match="smoothness"):
+        mb.MapSolver(matrix, weights, LAYOUT, mb.SolveOptions(smoothness=-1.0))
+    with pytest.raises(mb.InvalidArgument, match="tolerance"):
+        mb.MapSolver(matrix, weights, LAYOUT, mb.SolveOptions(tolerance=0.0))
+
+
+def test_diffuse_radiance_is_albedo_times_irradiance_over_pi(trace: mb.LayerTrace) -> None:
+    ball = mb.make_sphere((0, 0, 0), 1.0)
+    irradiance = np.ones_like(np.asarray(ball.positions))
+    diffuse = mb.diffuse_from_irradiance(trace.samples, np.asarray(ball.triangles), irradiance)
+    np.testing.assert_allclose(diffuse, np.asarray(trace.samples.albedo) / np.pi, rtol=1e-6)

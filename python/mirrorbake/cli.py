@@ -7,6 +7,7 @@ interrupted. Commands import what they need themselves: `--help` should not wait
 from __future__ import annotations
 
 import contextlib
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -89,9 +90,9 @@ def _print_figures(evaluation: Evaluation, json: bool) -> None:
     if json:
         typer.echo(evaluation.to_json(), nl=False)
     else:
-        console = Console(highlight=False)
         # A pipe or a log has no width of its own; the table should not be squeezed into 80 columns there.
-        console.print(metrics_table(evaluation), width=None if console.is_terminal else 120)
+        console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
+        console.print(metrics_table(evaluation))
 
 
 def _print_version(wanted: bool) -> None:

@@ -22,7 +22,7 @@ def _number(value: float | None, digits: int) -> str:
 def metrics_table(evaluation: Evaluation) -> Table:
     """Return the table of an evaluation for a terminal."""
     table = Table(title="PSNR on the object, dB (display-referred)", title_justify="left")
-    table.add_column("view t", justify="right")
+    table.add_column("view t", justify="right", no_wrap=True)
     table.add_column("sampled", justify="center")
     for heading in ("trace s", "build s", "solve s", *(TITLES[name] for name in CONTENDERS)):
         table.add_column(heading, justify="right")

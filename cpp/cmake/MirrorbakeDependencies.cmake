@@ -28,9 +28,10 @@ find_package(Eigen3 3.4 CONFIG QUIET)
 _mirrorbake_report(Eigen Eigen3_FOUND "${Eigen3_VERSION}" 3.4 libeigen3-dev "small dense algebra")
 
 # Debian's Imath, which OpenImageIO pulls in, reports its missing Python parts in spite of QUIET.
+set(_mirrorbake_log_level "${CMAKE_MESSAGE_LOG_LEVEL}")
 set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
 find_package(OpenImageIO CONFIG QUIET)
-unset(CMAKE_MESSAGE_LOG_LEVEL)
+set(CMAKE_MESSAGE_LOG_LEVEL "${_mirrorbake_log_level}")
 if(OpenImageIO_FOUND AND OpenImageIO_VERSION VERSION_LESS 2.4)
   set(OpenImageIO_FOUND FALSE)
 endif()

@@ -21,8 +21,8 @@ struct SolveOptions {
 };
 
 struct SolveReport {
-  int iterations = 0;              ///< of conjugate gradients, all rounds together
-  int rounds = 0;                  ///< of the active set that keeps the map within its bounds
+  int iterations = 0;            ///< of conjugate gradients, all rounds together
+  int rounds = 0;                ///< of the active set that keeps the map within its bounds
   double relative_gradient = 0;  ///< what `tolerance` is compared with
   std::size_t unknowns = 0;      ///< texels that some row sees; the others are filled in smoothly
   double rms_error = 0;          ///< weighted root mean square of A x − b over rows and channels

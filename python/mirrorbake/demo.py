@@ -26,8 +26,8 @@ def demo_config() -> SceneConfig:
         {
             "reflector": {"object": "teapot"},
             "surroundings": {"room": "furnished"},
-            "views": {"count": 5, "degrees": 4.0, "start": 20.0, "size": [384, 288]},
-            "maps": {"size": 128},
+            "views": {"count": 5, "degrees": 4.0, "start": 20.0, "size": [480, 360]},
+            "maps": {"size": 256},
             "trace": {"samples": 16},
         },
         "demo",

@@ -45,6 +45,8 @@ class BakeSummary:
     """How many of the views were there already."""
     clamped: int
     """Values of the maps that float16 could not hold."""
+    notes: list[str]
+    """What the user should know about the inputs."""
 
 
 def bake(
@@ -99,7 +101,7 @@ def bake(
                 report(index, total, f"view {index + 1} of {total}")
                 clamped += baker.bake_view(index)
         report(total, total, f"{total} views")
-    return BakeSummary(views=total, resumed=resumed, clamped=clamped)
+    return BakeSummary(views=total, resumed=resumed, clamped=clamped, notes=stage.built.notes)
 
 
 def _check_output(directory: Path, source: Source) -> None:

@@ -180,12 +180,13 @@ def bake_command(
     with _progress() as add_bar:
         summary = bake(config, out, add_bar("bake"))
     del limit
+    warnings = list(summary.notes)
     if summary.clamped:
-        messages.print(
-            f"warning: {summary.clamped} values above 65504 were clamped; "
-            "maps.precision = 'float32' keeps them",
-            markup=False,
+        warnings.append(
+            f"{summary.clamped} values above 65504 were clamped; maps.precision = 'float32' keeps them"
         )
+    for warning in warnings:
+        messages.print(f"warning: {warning}", markup=False, soft_wrap=True)
     resumed = f", {summary.resumed} of them from an earlier run" if summary.resumed else ""
     messages.print(f"{out}: {summary.views} views{resumed}", markup=False, soft_wrap=True)
 

@@ -93,12 +93,17 @@ def _crop(views: list[_View]) -> tuple[slice, slice]:
     seen = np.any([view.images.coverage > 0.0 for view in views], axis=0)
     if not seen.any():
         return slice(None), slice(None)
-    slices = []
-    for axis in (1, 0):
-        places = np.flatnonzero(seen.any(axis=axis))
-        margin = max(2, int(places[-1] - places[0]) // 12)
-        slices.append(slice(max(0, int(places[0]) - margin), int(places[-1]) + 1 + margin))
-    return slices[0], slices[1]
+    rows, columns = (np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0))
+    top, bottom = _widen(int(rows[0]), int(rows[-1]) + 1, 0, seen.shape[0])
+    # Pictures that are taller than wide would make the sheet too long to look at.
+    left, right = _widen(int(columns[0]), int(columns[-1]) + 1, bottom - top, seen.shape[1])
+    return slice(top, bottom), slice(left, right)
+
+
+def _widen(first: int, last: int, least: int, limit: int) -> tuple[int, int]:
+    """Add a margin to the pixels [first, last) so that they are at least `least`, within [0, limit)."""
+    margin = max(2, (last - first) // 12, (least - (last - first) + 1) // 2)
+    return max(0, first - margin), min(limit, last + margin)
 
 
 class _Sheet:

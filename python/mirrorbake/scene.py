@@ -70,6 +70,8 @@ class BuiltScene:
     part_names: list[str]
     has_diffuse: bool
     arc: Arc
+    notes: list[str]
+    """What the user should know about the inputs, such as values that had to be changed."""
 
 
 def hash_inputs(config: SceneConfig) -> dict[str, dict[str, str]]:
@@ -100,9 +102,10 @@ def build_scene(config: SceneConfig) -> BuiltScene:
     mirrorbake.InvalidArgument
         The scene is not usable: vertices that are not finite, no area.
     """
-    scene = (
-        _core.make_room() if config.surroundings.room is not None else _panorama_scene(config.surroundings)
-    )
+    if config.surroundings.room is not None:
+        scene, notes = _core.make_room(), list[str]()
+    else:
+        scene, notes = _panorama_scene(config.surroundings)
     mesh, part_names = _load_reflector(config.reflector)
     material = _material(config.material, scene)
     reflector = scene.add_object(REFLECTOR_NAME, mesh, material, part_names)
@@ -125,6 +128,7 @@ def build_scene(config: SceneConfig) -> BuiltScene:
         part_names=part_names,
         has_diffuse=any(config.material.albedo),
         arc=arc,
+        notes=notes,
     )
 
 
@@ -274,16 +278,19 @@ def _load_rgb(path: str) -> FloatArray:
     return np.ascontiguousarray(pixels[..., :3])
 
 
-def _panorama_scene(surroundings: Surroundings) -> _core.Scene:
+def _panorama_scene(surroundings: Surroundings) -> tuple[_core.Scene, list[str]]:
     assert surroundings.panorama is not None
-    scene = _core.Scene()
     panorama = _load_rgb(surroundings.panorama)
     bad = int(np.count_nonzero(~np.isfinite(panorama)))
-    if bad or float(panorama.min()) < 0.0:
-        bad += int(np.count_nonzero(panorama < 0.0))
-        raise InputError(
-            f"{surroundings.panorama}: {bad} values are negative or not finite; expected radiance ≥ 0"
-        )
+    if bad:
+        raise InputError(f"{surroundings.panorama}: {bad} values are not finite; expected radiance")
+    # Panoramas that were scaled down with a sharpening filter undershoot beside their lights.
+    negative = int(np.count_nonzero(panorama < 0.0))
+    notes = []
+    if negative:
+        notes.append(f"{surroundings.panorama}: {negative} negative values were taken as 0")
+        panorama = np.maximum(panorama, np.float32(0.0))
+    scene = _core.Scene()
     scene.set_environment(panorama, surroundings.scale, surroundings.rotation)
     if surroundings.ground is not None:
         material = _core.Material(name="ground", albedo=surroundings.ground.albedo)
@@ -291,7 +298,7 @@ def _panorama_scene(surroundings: Surroundings) -> _core.Scene:
             (0.0, -GROUND_THICKNESS, 0.0), surroundings.ground.radius, GROUND_THICKNESS, 96
         )
         scene.add_object("ground", disc, scene.add_material(material), [])
-    return scene
+    return scene, notes
 
 
 def _resolve_arc(views: Views, positions: FloatArray) -> Arc:

@@ -224,7 +224,7 @@ def test_a_panorama_that_is_corrupt_is_one_clear_error(tmp_path: Path, content: 
     assert not (tmp_path / "pem").exists()
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_panorama_with_impossible_radiance_is_one_clear_error(tmp_path: Path, value: float) -> None:
     pixels = np.ones((4, 8, 3), np.float32)
     pixels[1, 2, 0] = value
@@ -232,8 +232,22 @@ def test_a_panorama_with_impossible_radiance_is_one_clear_error(tmp_path: Path, 
     _core.save_image(str(panorama), pixels, ["R", "G", "B"], "float32")
     scene = write_scene(tmp_path)
     result = run("bake", scene, "--out", tmp_path / "pem", "--set", f"surroundings.panorama={panorama}")
-    assert_one_error(result, "sky.exr", "1 values are negative or not finite")
+    assert_one_error(result, "sky.exr", "1 values are not finite")
     assert not (tmp_path / "pem").exists()
+
+
+def test_negative_radiance_is_taken_as_0_with_a_warning(tmp_path: Path) -> None:
+    pixels = np.ones((4, 8, 3), np.float32)
+    pixels[1, 2:4, 0] = -0.5
+    panorama = tmp_path / "sky.exr"
+    _core.save_image(str(panorama), pixels, ["R", "G", "B"])
+    options = ["--set", f"surroundings.panorama={panorama}", "--views", "1"]
+    result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *options)
+    assert result.returncode == 0, result.stderr
+    assert f"warning: {panorama}: 2 negative values were taken as 0" in result.stderr
+    capture = PemStore.open(tmp_path / "pem").read_capture()
+    assert capture.min() >= 0.0
+    assert capture.min() < 0.5 < capture.max()
 
 
 def test_a_view_inside_the_object_is_one_clear_error(tmp_path: Path) -> None:

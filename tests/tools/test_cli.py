@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 
 from mirrorbake import _core
 from mirrorbake.cli import app
+from mirrorbake.config import load_config
 from mirrorbake.store import GROUP_NAME, PemStore
 
 EXIT_USAGE, EXIT_INPUT = 2, 3
@@ -363,6 +364,18 @@ def test_evaluate_writes_the_figures_it_prints(baked: Path) -> None:
     assert table.returncode == 0
     assert "PEM" in table.stdout
     assert f"{views[0]['psnr']['pem']:.2f}" in table.stdout
+
+
+def test_the_demonstration_leaves_figures_and_a_contact_sheet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = write_scene(tmp_path)
+    monkeypatch.setattr("mirrorbake.demo.demo_config", lambda: load_config(scene))
+    result = run("demo", "--out", tmp_path / "demo")
+    assert result.returncode == 0, result.stderr
+    assert "mean half-way" in result.stdout
+    names = {path.name for path in (tmp_path / "demo").iterdir()}
+    assert names == {"pem.zarr", "metrics.json", "contact-sheet.png"}
 
 
 @pytest.mark.parametrize("name", ["view.exr", "view.png"])

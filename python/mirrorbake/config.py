@@ -18,13 +18,18 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    field_validator,
     model_validator,
 )
 
+from mirrorbake import _core
 from mirrorbake.errors import InputError
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
+
+ILLUMINANT = "D65"
+"""Under which the colours of metals are meant: the white of Rec.709."""
 
 MAX_SCENE_BYTES = 1 << 20
 MAX_IMAGE_SIDE = 16384
@@ -127,9 +132,11 @@ class MaterialConfig(_Section):
     ior: Index | None = None
     """`dielectric`: relative index of refraction. Default 1.5."""
     eta: Index | None = None
-    """`conductor`: real part of the relative index. Required there."""
+    """`conductor`: real part of the relative index."""
     k: Extinction | None = None
-    """`conductor`: extinction coefficient. Required there."""
+    """`conductor`: extinction coefficient."""
+    metal: str | None = None
+    """`conductor`: takes `eta` and `k` from the measured optical constants of a metal, by name or symbol."""
     albedo: Reflectance = (0.0, 0.0, 0.0)
     """Diffuse reflectance under the mirror lobe; black has no diffuse layer."""
     texture: str | None = None
@@ -139,13 +146,26 @@ class MaterialConfig(_Section):
 
     @model_validator(mode="after")
     def _parameters_fit_the_model(self) -> MaterialConfig:
-        used = {"constant": {"r0"}, "schlick": {"r0"}, "dielectric": {"ior"}, "conductor": {"eta", "k"}}
-        for key in ("r0", "ior", "eta", "k"):
+        used = {
+            "constant": {"r0"},
+            "schlick": {"r0"},
+            "dielectric": {"ior"},
+            "conductor": {"eta", "k", "metal"},
+        }
+        for key in ("r0", "ior", "eta", "k", "metal"):
             if getattr(self, key) is not None and key not in used[self.fresnel]:
                 raise ValueError(f"`{key}` has no meaning for fresnel = {self.fresnel!r}")
-        if self.fresnel == "conductor" and (self.eta is None or self.k is None):
-            raise ValueError("fresnel = 'conductor' needs `eta` and `k`")
+        has_index = self.eta is not None and self.k is not None
+        if self.fresnel == "conductor" and (self.metal is not None) == has_index:
+            raise ValueError("fresnel = 'conductor' needs either `metal`, or `eta` and `k`")
         return self
+
+    @field_validator("metal")
+    @classmethod
+    def _known_metal(cls, name: str | None) -> str | None:
+        if name is not None:
+            _core.fit_metal(name, ILLUMINANT)
+        return name
 
 
 class Ground(_Section):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.config import PATH_KEYS
+from mirrorbake.config import ILLUMINANT, PATH_KEYS
 from mirrorbake.errors import InputError
 from mirrorbake.files import sha256_of
 
@@ -251,12 +251,11 @@ def _stand_on_ground(positions: NDArray[np.float64], reflector: Reflector) -> ND
 
 
 def _material(config: MaterialConfig, scene: _core.Scene) -> int:
-    fresnel = _core.Fresnel(
-        model=getattr(_core.FresnelModel, config.fresnel),
-        r0=config.r0 or (0.9, 0.9, 0.9),
-        eta=config.eta or config.ior or (1.5, 1.5, 1.5),
-        k=config.k or (0.0, 0.0, 0.0),
-    )
+    eta, k = config.eta or config.ior or (1.5, 1.5, 1.5), config.k or (0.0, 0.0, 0.0)
+    if config.metal is not None:
+        _, _, eta, k, _ = _core.fit_metal(config.metal, ILLUMINANT)
+    model = getattr(_core.FresnelModel, config.fresnel)
+    fresnel = _core.Fresnel(model=model, r0=config.r0 or (0.9, 0.9, 0.9), eta=eta, k=k)
     texture = -1 if config.texture is None else scene.add_texture(_load_rgb(config.texture))
     material = _core.Material(
         name=REFLECTOR_NAME,

@@ -64,8 +64,13 @@ def test_an_empty_scene_is_the_teapot_in_its_room_at_the_papers_size() -> None:
             "scene: material: `ior` has no meaning for fresnel = 'schlick'",
         ),
         (
+            {"material": {"fresnel": "conductor", "metal": "mithril"}},
+            "scene: material.metal = 'mithril': metal is mithril, expected aluminium, silver, gold, copper, "
+            "chromium or titanium",
+        ),
+        (
             {"material": {"fresnel": "conductor", "eta": 0.2}},
-            "scene: material: fresnel = 'conductor' needs `eta` and `k`",
+            "scene: material: fresnel = 'conductor' needs either `metal`, or `eta` and `k`",
         ),
     ],
 )

@@ -138,6 +138,19 @@ def test_a_view_inside_the_object_is_rejected(cuboid: str) -> None:
         build(reflector={"mesh": cuboid, "scale": 1.0}, views=views)
 
 
+def test_a_reflector_of_gold_has_the_colour_of_gold() -> None:
+    built = build(material={"fresnel": "conductor", "metal": "gold"})
+    fresnel = built.scene.material(built.scene.object_material(built.reflector)).fresnel
+    # Normal incidence, exact: ((η − 1)² + k²) / ((η + 1)² + k²); gold reflects little blue.
+    red, green, blue = (
+        ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
+        for eta, k in zip(fresnel.eta, fresnel.k, strict=True)
+    )
+    assert red > 0.95
+    assert 0.65 < green < 0.8
+    assert 0.3 < blue < 0.45
+
+
 def test_input_files_are_known_by_their_content(cuboid: str, tmp_path: Path) -> None:
     config = parse_config({"reflector": {"mesh": cuboid}}, "scene")
     inputs = hash_inputs(config)

@@ -407,11 +407,16 @@ def load_config(path: Path, overrides: Sequence[tuple[tuple[str, ...], Any]] = (
     return parse_config(data, str(path))
 
 
-_ALTERNATIVES = {
-    "reflector.mesh": "object",
-    "reflector.object": "mesh",
-    "surroundings.panorama": "room",
-    "surroundings.room": "panorama",
+# What a new value of a key makes meaningless.
+_ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
+    "reflector.mesh": ("object",),
+    "reflector.object": ("mesh",),
+    "material.fresnel": ("r0", "ior", "eta", "k", "metal"),
+    "material.metal": ("eta", "k"),
+    "material.eta": ("metal",),
+    "material.k": ("metal",),
+    "surroundings.panorama": ("room",),
+    "surroundings.room": ("panorama", "ground"),
 }
 
 
@@ -429,7 +434,9 @@ def _merge(data: dict[str, Any], replacements: Mapping[str, Any], path: tuple[st
             _merge(data[key], value, (*path, key))
             continue
         data[key] = value
-        data.pop(_ALTERNATIVES.get(".".join((*path, key)), ""), None)
+        for other in _ALTERNATIVES.get(".".join((*path, key)), ()):
+            if other not in replacements:
+                data.pop(other, None)
 
 
 def _resolve_paths(data: Mapping[str, Any], folder: Path) -> None:

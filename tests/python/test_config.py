@@ -131,6 +131,18 @@ def test_an_override_of_the_mesh_replaces_the_built_in_object(tmp_path: Path) ->
     assert config.views.centre == (0, 1, 0)
 
 
+def test_an_override_of_the_fresnel_model_drops_the_parameters_of_the_other(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[material]\nfresnel = "conductor"\nmetal = "gold"\n')
+    overrides = [parse_override("material.fresnel=dielectric"), parse_override("material.ior=1.3")]
+    material = load_config(scene, overrides).material
+    assert (material.fresnel, material.ior, material.metal) == ("dielectric", (1.3, 1.3, 1.3), None)
+    material = load_config(
+        scene, [parse_override("material.eta=0.2"), parse_override("material.k=3")]
+    ).material
+    assert (material.eta, material.metal) == ((0.2, 0.2, 0.2), None)
+
+
 @pytest.mark.parametrize("text", ["maps.size", "size=3", "=3", "maps.=3", ""])
 def test_an_override_without_a_key_path_is_rejected(text: str) -> None:
     with pytest.raises(InputError, match=r"expected section\.key=value"):

@@ -1,0 +1,56 @@
+"""The scene files under examples/ do what their comments say."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from mirrorbake.bake import bake
+from mirrorbake.config import SceneConfig, load_config, parse_override
+from mirrorbake.evaluate import evaluate
+from mirrorbake.scene import prepare_stage
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DATA = os.environ.get("MIRRORBAKE_TEST_DATA")
+
+
+def test_the_teapot_example_is_the_papers_set_up() -> None:
+    config = load_config(EXAMPLES / "teapot-room.toml")
+    assert config.views.count == 100
+    assert config.views.degrees / (config.views.count - 1) == 1.0
+    assert (config.maps.size, config.views.size, config.trace.samples) == (256, (512, 512), 16)
+    defaults = SceneConfig()
+    for section in ("reflector", "surroundings", "views", "layers", "trace", "infer"):
+        assert getattr(config, section) == getattr(defaults, section)
+
+
+@pytest.mark.skipif(DATA is None, reason="MIRRORBAKE_TEST_DATA is not set")
+@pytest.mark.parametrize(("mesh", "panorama"), [("suzanne", "workshop"), ("spot", "venice")])
+def test_the_mesh_example_takes_any_mesh_and_panorama(tmp_path: Path, mesh: str, panorama: str) -> None:
+    assert DATA is not None
+    assignments = [
+        f"reflector.mesh={DATA}/{mesh}.obj",
+        f"surroundings.panorama={DATA}/{panorama}.exr",
+        "views.count=2",
+        "views.degrees=1",
+        "views.size=[96,96]",
+        "maps.size=64",
+        "trace.samples=4",
+        "trace.indirect=none",
+    ]
+    config = load_config(EXAMPLES / "mesh-panorama.toml", [parse_override(text) for text in assignments])
+    stage = prepare_stage(config)
+    # Both stand upright on the ground at the height that was asked for.
+    heights = stage.built.positions[:, 1]
+    assert heights.min() == pytest.approx(0.0, abs=1e-6)
+    assert heights.max() == pytest.approx(config.reflector.height, rel=1e-5)
+    bake(config, tmp_path / "pem", None, stage)
+    evaluation = evaluate(tmp_path / "pem", None, stage)
+    pem = evaluation.mean_psnr("pem", sampled=True)
+    static = evaluation.mean_psnr("static_infinite", sampled=True)
+    assert pem is not None
+    assert static is not None
+    # At full size the lead is 5 dB (Suzanne) and 8 dB (Spot); few pixels and noise take some of it.
+    assert pem - static > 2.0

@@ -123,7 +123,7 @@ double error_of(const Proxy& proxy, const Rays& rays) {
 
 TEST(ChooseProxy, TakesTheShapeOfTheSurroundingsAndIsNearTheBestInUnseenViews) {
   for (const Scene& scene : varied_scenes()) {
-    const Rays seen = reflections(scene.distance, {0, 10, 20, 30}, 500, 1);
+    const Rays seen = reflections(scene.distance, {0, 10, 20, 30}, 200, 1);
     const Rays unseen = reflections(scene.distance, {5, 15, 25, 36}, 2000, 2);
     const ProxyChoice choice = choose_proxy(seen.traced(), {0, 0, 0});
     std::string table;

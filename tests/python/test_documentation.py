@@ -8,12 +8,21 @@ import pytest
 from typer.main import get_command
 
 import mirrorbake
+from mirrorbake.bake import bake
 from mirrorbake.cli import app
+from mirrorbake.config import parse_config
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PYTHON = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHELL = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+SMALL_TEAPOT = {
+    "reflector": {"object": "teapot", "subdivisions": 4},
+    "views": {"count": 1, "size": [48, 48]},
+    "maps": {"size": 16},
+    "trace": {"samples": 2, "indirect": "none"},
+}
 
 
 def blocks(pattern: re.Pattern[str]) -> dict[str, list[str]]:
@@ -26,8 +35,10 @@ def test_python_examples_of_a_page_run_from_top_to_bottom(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    # The examples' own file.
+    # The examples' own files.
     mirrorbake.save_image("panorama.exr", np.full((128, 256, 3), 0.5, np.float32))
+    if any("out/teapot" in block for block in blocks(PYTHON)[page]):
+        bake(parse_config(SMALL_TEAPOT, "small teapot"), tmp_path / "out" / "teapot")
     namespace: dict[str, object] = {}
     for block in blocks(PYTHON)[page]:
         exec(compile(block, page, "exec"), namespace)

@@ -95,6 +95,32 @@ bool read_whole_file(std::vector<unsigned char>* out, std::string* error, const 
   }
 }
 
+bool refuse_to_write(std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
+  return false;
+}
+
+[[maybe_unused]] bool file_size(std::size_t* size, std::string* error, const std::string& joined,
+                                void* user) {
+  std::vector<unsigned char> bytes;
+  if (!read_whole_file(&bytes, error, joined, user)) return false;
+  *size = bytes.size();
+  return true;
+}
+
+// tinygltf takes either all callbacks or none, and falls back to the whole file system without a word. What "all"
+// is depends on its version: 2.9 asks for the size of a file too.
+template <typename Callbacks>
+Callbacks file_callbacks(Directory* directory) {
+  Callbacks callbacks{};
+  callbacks.FileExists = file_exists;
+  callbacks.ExpandFilePath = [](const std::string& name, void*) { return name; };
+  callbacks.ReadWholeFile = read_whole_file;
+  callbacks.WriteWholeFile = refuse_to_write;
+  if constexpr (requires { callbacks.GetFileSizeInBytes; }) callbacks.GetFileSizeInBytes = file_size;
+  callbacks.user_data = directory;
+  return callbacks;
+}
+
 bool keep_encoded(tinygltf::Image* image, int, std::string*, std::string*, int, int,
                   const unsigned char* bytes, int size, void*) {
   image->as_is = true;
@@ -240,8 +266,7 @@ tinygltf::Model read_document(const std::string& path) {
   Directory directory{std::filesystem::weakly_canonical(path, code).parent_path(), {}};
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(keep_encoded, nullptr);
-  loader.SetFsCallbacks({file_exists, [](const std::string& name, void*) { return name; }, read_whole_file,
-                         nullptr, &directory});
+  loader.SetFsCallbacks(file_callbacks<tinygltf::FsCallbacks>(&directory));
   tinygltf::Model model;
   std::string errors;
   std::string warnings;

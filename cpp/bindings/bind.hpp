@@ -56,8 +56,27 @@ nb::ndarray<nb::numpy, const T> scalars_view(const std::vector<T>& values, nb::h
 
 }  // namespace mirrorbake::bindings
 
-// A glm::vec3 is any sequence of three numbers in Python and comes back as a tuple.
+// A glm::vec2 or glm::vec3 is any sequence of two or three numbers in Python and comes back as a tuple.
 namespace nanobind::detail {
+
+template <>
+struct type_caster<glm::vec2> {
+  NB_TYPE_CASTER(glm::vec2, const_name("collections.abc.Sequence[float]"))
+
+  bool from_python(handle source, uint8_t, cleanup_list*) noexcept {
+    try {
+      if (len(source) != 2) return false;
+      for (int i = 0; i < 2; ++i) value[i] = cast<float>(float_(source[i]));
+      return true;
+    } catch (...) {
+      PyErr_Clear();
+      return false;
+    }
+  }
+  static handle from_cpp(glm::vec2 v, rv_policy, cleanup_list*) noexcept {
+    return make_tuple(v.x, v.y).release();
+  }
+};
 
 template <>
 struct type_caster<glm::vec3> {

@@ -1,3 +1,4 @@
+#include <nanobind/operators.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -48,6 +49,13 @@ const Element& element(const std::vector<Element>& elements, const char* argumen
                           "0 to " + std::to_string(elements.size()) + " (exclusive)");
   }
   return elements[static_cast<std::size_t>(index)];
+}
+
+// Returns the new element's index.
+template <typename Element>
+int append(std::vector<Element>& elements, Element element) {
+  elements.push_back(std::move(element));
+  return static_cast<int>(elements.size()) - 1;
 }
 
 template <typename Named>
@@ -142,6 +150,39 @@ void bind_shapes(nb::module_& m) {
       "missing, corrupt, empty or refers to files outside its directory.");
 }
 
+void bind_texture(nb::module_& m) {
+  nb::enum_<TextureWrap>(m, "TextureWrap", "How a coordinate outside [0,1] finds a texel.")
+      .value("repeat", TextureWrap::repeat, "tiled")
+      .value("clamp", TextureWrap::clamp, "the border's")
+      .value("mirror", TextureWrap::mirror, "tiled, every second tile mirrored");
+  nb::class_<TextureReference>(
+      m, "TextureReference",
+      "A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of\n"
+      "KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation` "
+      "radians\n"
+      "about (0, 0), then moved. An int stands for the texture of that index.")
+      .def(
+          "__init__",
+          [](TextureReference* self, int texture, glm::vec2 offset, glm::vec2 scale, float rotation) {
+            new (self) TextureReference{texture, offset, scale, rotation};
+          },
+          nb::arg("texture") = -1, nb::arg("offset") = glm::vec2(0.0F), nb::arg("scale") = glm::vec2(1.0F),
+          nb::arg("rotation") = 0.0F)
+      .def_rw("texture", &TextureReference::texture)
+      .def_rw("offset", &TextureReference::offset)
+      .def_rw("scale", &TextureReference::scale)
+      .def_rw("rotation", &TextureReference::rotation)
+      .def(nb::self == nb::self)
+      .def("__repr__", [](const TextureReference& r) {
+        const auto pair = [](glm::vec2 v) {
+          return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ")";
+        };
+        return "TextureReference(" + std::to_string(r.texture) + ", offset=" + pair(r.offset) +
+               ", scale=" + pair(r.scale) + ", rotation=" + std::to_string(r.rotation) + ")";
+      });
+  nb::implicitly_convertible<int, TextureReference>();
+}
+
 void bind_material(nb::module_& m) {
   nb::enum_<FresnelModel>(m, "FresnelModel", "How the reflectance of a mirror depends on the angle.")
       .value("constant", FresnelModel::constant, "r0 at every angle")
@@ -165,23 +206,51 @@ void bind_material(nb::module_& m) {
   nb::enum_<LayerModel>(m, "LayerModel", "How diffuse light L_d and mirrored light L_m add up.")
       .value("additive", LayerModel::additive, "F L_m + L_d")
       .value("coated", LayerModel::coated, "F L_m + (1 − F) L_d");
+  nb::enum_<SpecularLobe>(m, "SpecularLobe", "Shape of the specular lobe about the mirror direction.")
+      .value("mirror", SpecularLobe::mirror, "a perfect mirror")
+      .value("ggx", SpecularLobe::ggx, "microfacets after Trowbridge and Reitz, of `roughness` α")
+      .value("phong", SpecularLobe::phong, "(r·l)^N, normalised, of `exponent` N");
   nb::class_<Material>(m, "Material", "What a surface does with light.")
       .def(
           "__init__",
-          [](Material* self, std::string name, glm::vec3 albedo, int albedo_texture, bool specular,
-             const Fresnel& fresnel, LayerModel layers, glm::vec3 emission) {
-            new (self) Material{std::move(name), albedo, albedo_texture, specular, fresnel, layers, emission};
+          [](Material* self, std::string name, glm::vec3 albedo, const TextureReference& albedo_texture,
+             bool specular, const Fresnel& fresnel, const TextureReference& specular_texture,
+             SpecularLobe lobe, float roughness, const TextureReference& roughness_texture, float exponent,
+             LayerModel layers, glm::vec3 emission, const TextureReference& emission_texture) {
+            new (self) Material{std::move(name),  albedo,   albedo_texture,  specular,          fresnel,
+                                specular_texture, lobe,     roughness,       roughness_texture, exponent,
+                                layers,           emission, emission_texture};
           },
           nb::kw_only(), nb::arg("name") = "", nb::arg("albedo") = glm::vec3(0.5F),
-          nb::arg("albedo_texture") = -1, nb::arg("specular") = false, nb::arg("fresnel") = Fresnel{},
-          nb::arg("layers") = LayerModel::additive, nb::arg("emission") = glm::vec3(0.0F))
+          nb::arg("albedo_texture") = TextureReference{}, nb::arg("specular") = false,
+          nb::arg("fresnel") = Fresnel{}, nb::arg("specular_texture") = TextureReference{},
+          nb::arg("lobe") = SpecularLobe::mirror, nb::arg("roughness") = Material{}.roughness,
+          nb::arg("roughness_texture") = TextureReference{}, nb::arg("exponent") = Material{}.exponent,
+          nb::arg("layers") = LayerModel::additive, nb::arg("emission") = glm::vec3(0.0F),
+          nb::arg("emission_texture") = TextureReference{})
       .def_rw("name", &Material::name)
       .def_rw("albedo", &Material::albedo, "Lambertian reflectance per channel, in [0, 1]")
-      .def_rw("albedo_texture", &Material::albedo_texture, "index of a texture of the scene, or −1")
-      .def_rw("specular", &Material::specular, "whether it mirrors, weighted by `fresnel`")
+      .def_rw("albedo_texture", &Material::albedo_texture, "multiplies `albedo`")
+      .def_rw("specular", &Material::specular, "whether it has a specular lobe, weighted by `fresnel`")
       .def_rw("fresnel", &Material::fresnel)
+      .def_rw("specular_texture", &Material::specular_texture,
+              "multiplies the `r0` of a constant or Schlick's reflectance")
+      .def_rw("lobe", &Material::lobe)
+      .def_rw("roughness", &Material::roughness, "of the lobe `ggx`: its α, in (0, 1]")
+      .def_rw("roughness_texture", &Material::roughness_texture, "its first channel multiplies `roughness`")
+      .def_rw("exponent", &Material::exponent, "of the lobe `phong`: N, in [1, 1e6]")
       .def_rw("layers", &Material::layers)
-      .def_rw("emission", &Material::emission, "radiance emitted on the front side, W sr⁻¹ m⁻²");
+      .def_rw("emission", &Material::emission, "radiance emitted on the front side, W sr⁻¹ m⁻²")
+      .def_rw("emission_texture", &Material::emission_texture, "multiplies `emission`");
+}
+
+void bind_visibility(nb::module_& m) {
+  nb::enum_<Visibility>(m, "Visibility", nb::is_flag(), "A set of the kinds of rays that see an object.")
+      .value("none", Visibility::none)
+      .value("camera", Visibility::camera, "rays from the eye, and those of a capture")
+      .value("reflection", Visibility::reflection, "rays that leave a surface, specular or diffuse")
+      .value("shadow", Visibility::shadow, "rays towards a light")
+      .value("all", Visibility::all);
 }
 
 }  // namespace
@@ -189,7 +258,9 @@ void bind_material(nb::module_& m) {
 void bind_scene(nb::module_& m) {
   bind_mesh(m);
   bind_shapes(m);
+  bind_texture(m);
   bind_material(m);
+  bind_visibility(m);
 
   nb::class_<Scene>(
       m, "Scene",
@@ -198,47 +269,69 @@ void bind_scene(nb::module_& m) {
       .def(nb::init<>())
       .def(
           "add_texture",
-          [](Scene& scene, const RgbImage& pixels) {
-            scene.textures.push_back(rgb_image(pixels));
-            return static_cast<int>(scene.textures.size()) - 1;
+          [](Scene& scene, const RgbImage& pixels, TextureWrap wrap_u, TextureWrap wrap_v) {
+            return append(scene.textures, Texture{rgb_image(pixels), wrap_u, wrap_v});
           },
-          nb::arg("pixels"),
-          "Add a repeating texture of shape (height, width, 3), values in [0, 1], row 0 at the top.")
+          nb::arg("pixels"), nb::arg("wrap_u") = TextureWrap::repeat, nb::arg("wrap_v") = TextureWrap::repeat,
+          "Add a texture of shape (height, width, 3), values in [0, 1], row 0 at the top.")
       .def(
           "add_material",
-          [](Scene& scene, const Material& material) {
-            scene.materials.push_back(material);
-            return static_cast<int>(scene.materials.size()) - 1;
-          },
+          [](Scene& scene, const Material& material) { return append(scene.materials, material); },
           nb::arg("material"), "Add a copy of a material.")
       .def(
           "add_object",
           [](Scene& scene, std::string name, const TriangleMesh& mesh, int material,
-             std::vector<std::string> part_names) {
+             std::vector<std::string> part_names, Visibility visibility) {
             element(scene.materials, "material", material);
-            scene.objects.push_back({std::move(name), mesh, material, std::move(part_names)});
-            return static_cast<int>(scene.objects.size()) - 1;
+            return append(scene.objects,
+                          Object{std::move(name), mesh, material, std::move(part_names), visibility});
           },
           nb::arg("name"), nb::arg("mesh"), nb::arg("material"),
-          nb::arg("part_names") = std::vector<std::string>{},
+          nb::arg("part_names") = std::vector<std::string>{}, nb::arg("visibility") = Visibility::all,
           "Add a copy of a mesh, in world space, with the material of that index. `part_names` names its "
           "parts, if it\n"
           "has more than one.")
       .def(
           "add_rectangle_light",
           [](Scene& scene, glm::vec3 corner, glm::vec3 edge_u, glm::vec3 edge_v, glm::vec3 radiance) {
-            scene.rectangle_lights.push_back({corner, edge_u, edge_v, radiance});
-            return static_cast<int>(scene.rectangle_lights.size()) - 1;
+            return append(scene.rectangle_lights, RectangleLight{corner, edge_u, edge_v, radiance});
           },
           nb::arg("corner"), nb::arg("edge_u"), nb::arg("edge_v"), nb::arg("radiance"),
           "Add a rectangle that emits `radiance` (W sr⁻¹ m⁻²) along edge_u × edge_v.")
       .def(
           "add_point_light",
           [](Scene& scene, glm::vec3 position, glm::vec3 intensity) {
-            scene.point_lights.push_back({position, intensity});
-            return static_cast<int>(scene.point_lights.size()) - 1;
+            return append(scene.point_lights, PointLight{position, intensity});
           },
           nb::arg("position"), nb::arg("intensity"), "Add a light of `intensity` W sr⁻¹ in every direction.")
+      .def(
+          "add_sphere_light",
+          [](Scene& scene, glm::vec3 centre, float radius, glm::vec3 radiance) {
+            return append(scene.sphere_lights, SphereLight{centre, radius, radiance});
+          },
+          nb::arg("centre"), nb::arg("radius"), nb::arg("radiance"),
+          "Add a sphere that emits `radiance` (W sr⁻¹ m⁻²) outwards.")
+      .def(
+          "add_directional_light",
+          [](Scene& scene, glm::vec3 direction, glm::vec3 irradiance) {
+            return append(scene.directional_lights, DirectionalLight{direction, irradiance});
+          },
+          nb::arg("direction"), nb::arg("irradiance"),
+          "Add parallel light that travels along the unit vector `direction` and gives a surface that faces "
+          "it\n"
+          "`irradiance` W m⁻².")
+      .def(
+          "add_spot_light",
+          [](Scene& scene, glm::vec3 position, glm::vec3 direction, glm::vec3 intensity, float inner_degrees,
+             float outer_degrees) {
+            return append(scene.spot_lights,
+                          SpotLight{position, direction, intensity, inner_degrees, outer_degrees});
+          },
+          nb::arg("position"), nb::arg("direction"), nb::arg("intensity"), nb::arg("inner_degrees") = 0.0F,
+          nb::arg("outer_degrees") = 45.0F,
+          "Add a light of `intensity` W sr⁻¹ along the unit vector `direction`: in full up to "
+          "`inner_degrees` from\n"
+          "that axis, falling to 0 at `outer_degrees` (at most 90).")
       .def(
           "set_environment",
           [](Scene& scene, const RgbImage& panorama, float scale, float rotation_degrees) {
@@ -267,6 +360,17 @@ void bind_scene(nb::module_& m) {
             return o.part_names.empty() ? std::vector<std::string>{o.name} : o.part_names;
           },
           nb::arg("object"), "Names of an object's parts; its own if it has only one.")
+      .def(
+          "object_visibility",
+          [](const Scene& scene, int object) { return element(scene.objects, "object", object).visibility; },
+          nb::arg("object"), "The kinds of rays that see an object.")
+      .def(
+          "set_object_visibility",
+          [](Scene& scene, int object, Visibility visibility) {
+            element(scene.objects, "object", object);
+            scene.objects[static_cast<std::size_t>(object)].visibility = visibility;
+          },
+          nb::arg("object"), nb::arg("visibility"), "Choose the kinds of rays that see an object.")
       .def(
           "material",
           [](const Scene& scene, int material) { return element(scene.materials, "material", material); },

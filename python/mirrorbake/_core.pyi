@@ -364,6 +364,55 @@ def load_mesh(path: str) -> TriangleMesh:
     missing, corrupt, empty or refers to files outside its directory.
     """
 
+class TextureWrap(enum.Enum):
+    """How a coordinate outside [0,1] finds a texel."""
+
+    repeat = 0
+    """tiled"""
+
+    clamp = 1
+    """the border's"""
+
+    mirror = 2
+    """tiled, every second tile mirrored"""
+
+class TextureReference:
+    """
+    A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of
+    KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation` radians
+    about (0, 0), then moved. An int stands for the texture of that index.
+    """
+
+    def __init__(self, texture: int = -1, offset: Sequence[float] = (0.0, 0.0), scale: Sequence[float] = (1.0, 1.0), rotation: float = 0.0) -> None: ...
+
+    @property
+    def texture(self) -> int: ...
+
+    @texture.setter
+    def texture(self, arg: int, /) -> None: ...
+
+    @property
+    def offset(self) -> Sequence[float]: ...
+
+    @offset.setter
+    def offset(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def scale(self) -> Sequence[float]: ...
+
+    @scale.setter
+    def scale(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def rotation(self) -> float: ...
+
+    @rotation.setter
+    def rotation(self, arg: float, /) -> None: ...
+
+    def __eq__(self, arg: TextureReference, /) -> bool: ...
+
+    def __repr__(self) -> str: ...
+
 class FresnelModel(enum.Enum):
     """How the reflectance of a mirror depends on the angle."""
 
@@ -422,10 +471,22 @@ class LayerModel(enum.Enum):
     coated = 1
     """F L_m + (1 − F) L_d"""
 
+class SpecularLobe(enum.Enum):
+    """Shape of the specular lobe about the mirror direction."""
+
+    mirror = 0
+    """a perfect mirror"""
+
+    ggx = 1
+    """microfacets after Trowbridge and Reitz, of `roughness` α"""
+
+    phong = 2
+    """(r·l)^N, normalised, of `exponent` N"""
+
 class Material:
     """What a surface does with light."""
 
-    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: int = -1, specular: bool = False, fresnel: Fresnel = ..., layers: LayerModel = LayerModel.additive, emission: Sequence[float] = (0.0, 0.0, 0.0)) -> None: ...
+    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: TextureReference = ..., specular: bool = False, fresnel: Fresnel = ..., specular_texture: TextureReference = ..., lobe: SpecularLobe = SpecularLobe.mirror, roughness: float = 0.10000000149011612, roughness_texture: TextureReference = ..., exponent: float = 100.0, layers: LayerModel = LayerModel.additive, emission: Sequence[float] = (0.0, 0.0, 0.0), emission_texture: TextureReference = ...) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -441,15 +502,15 @@ class Material:
     def albedo(self, arg: Sequence[float], /) -> None: ...
 
     @property
-    def albedo_texture(self) -> int:
-        """index of a texture of the scene, or −1"""
+    def albedo_texture(self) -> TextureReference:
+        """multiplies `albedo`"""
 
     @albedo_texture.setter
-    def albedo_texture(self, arg: int, /) -> None: ...
+    def albedo_texture(self, arg: TextureReference, /) -> None: ...
 
     @property
     def specular(self) -> bool:
-        """whether it mirrors, weighted by `fresnel`"""
+        """whether it has a specular lobe, weighted by `fresnel`"""
 
     @specular.setter
     def specular(self, arg: bool, /) -> None: ...
@@ -459,6 +520,40 @@ class Material:
 
     @fresnel.setter
     def fresnel(self, arg: Fresnel, /) -> None: ...
+
+    @property
+    def specular_texture(self) -> TextureReference:
+        """multiplies the `r0` of a constant or Schlick's reflectance"""
+
+    @specular_texture.setter
+    def specular_texture(self, arg: TextureReference, /) -> None: ...
+
+    @property
+    def lobe(self) -> SpecularLobe: ...
+
+    @lobe.setter
+    def lobe(self, arg: SpecularLobe, /) -> None: ...
+
+    @property
+    def roughness(self) -> float:
+        """of the lobe `ggx`: its α, in (0, 1]"""
+
+    @roughness.setter
+    def roughness(self, arg: float, /) -> None: ...
+
+    @property
+    def roughness_texture(self) -> TextureReference:
+        """its first channel multiplies `roughness`"""
+
+    @roughness_texture.setter
+    def roughness_texture(self, arg: TextureReference, /) -> None: ...
+
+    @property
+    def exponent(self) -> float:
+        """of the lobe `phong`: N, in [1, 1e6]"""
+
+    @exponent.setter
+    def exponent(self, arg: float, /) -> None: ...
 
     @property
     def layers(self) -> LayerModel: ...
@@ -473,6 +568,29 @@ class Material:
     @emission.setter
     def emission(self, arg: Sequence[float], /) -> None: ...
 
+    @property
+    def emission_texture(self) -> TextureReference:
+        """multiplies `emission`"""
+
+    @emission_texture.setter
+    def emission_texture(self, arg: TextureReference, /) -> None: ...
+
+class Visibility(enum.Flag):
+    """A set of the kinds of rays that see an object."""
+
+    none = 0
+
+    camera = 1
+    """rays from the eye, and those of a capture"""
+
+    reflection = 2
+    """rays that leave a surface, specular or diffuse"""
+
+    shadow = 4
+    """rays towards a light"""
+
+    all = 7
+
 class Scene:
     """
     Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours and
@@ -481,15 +599,15 @@ class Scene:
 
     def __init__(self) -> None: ...
 
-    def add_texture(self, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)]) -> int:
+    def add_texture(self, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], wrap_u: TextureWrap = TextureWrap.repeat, wrap_v: TextureWrap = TextureWrap.repeat) -> int:
         """
-        Add a repeating texture of shape (height, width, 3), values in [0, 1], row 0 at the top.
+        Add a texture of shape (height, width, 3), values in [0, 1], row 0 at the top.
         """
 
     def add_material(self, material: Material) -> int:
         """Add a copy of a material."""
 
-    def add_object(self, name: str, mesh: TriangleMesh, material: int, part_names: Sequence[str] = []) -> int:
+    def add_object(self, name: str, mesh: TriangleMesh, material: int, part_names: Sequence[str] = [], visibility: Visibility = Visibility.all) -> int:
         """
         Add a copy of a mesh, in world space, with the material of that index. `part_names` names its parts, if it
         has more than one.
@@ -502,6 +620,21 @@ class Scene:
 
     def add_point_light(self, position: Sequence[float], intensity: Sequence[float]) -> int:
         """Add a light of `intensity` W sr⁻¹ in every direction."""
+
+    def add_sphere_light(self, centre: Sequence[float], radius: float, radiance: Sequence[float]) -> int:
+        """Add a sphere that emits `radiance` (W sr⁻¹ m⁻²) outwards."""
+
+    def add_directional_light(self, direction: Sequence[float], irradiance: Sequence[float]) -> int:
+        """
+        Add parallel light that travels along the unit vector `direction` and gives a surface that faces it
+        `irradiance` W m⁻².
+        """
+
+    def add_spot_light(self, position: Sequence[float], direction: Sequence[float], intensity: Sequence[float], inner_degrees: float = 0.0, outer_degrees: float = 45.0) -> int:
+        """
+        Add a light of `intensity` W sr⁻¹ along the unit vector `direction`: in full up to `inner_degrees` from
+        that axis, falling to 0 at `outer_degrees` (at most 90).
+        """
 
     def set_environment(self, panorama: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], scale: float = 1.0, rotation_degrees: float = 0.0) -> None:
         """
@@ -524,6 +657,12 @@ class Scene:
 
     def object_part_names(self, object: int) -> list[str]:
         """Names of an object's parts; its own if it has only one."""
+
+    def object_visibility(self, object: int) -> Visibility:
+        """The kinds of rays that see an object."""
+
+    def set_object_visibility(self, object: int, visibility: Visibility) -> None:
+        """Choose the kinds of rays that see an object."""
 
     def material(self, material: int) -> Material:
         """Copy of a material."""

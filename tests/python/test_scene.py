@@ -57,7 +57,7 @@ def test_bad_meshes_are_rejected_by_field() -> None:
 
 def test_scene_holds_what_is_added() -> None:
     scene = _core.Scene()
-    texture = scene.add_texture(np.full((2, 4, 3), 0.25, dtype=np.float32))
+    texture = scene.add_texture(np.full((2, 4, 3), 0.25, dtype=np.float32), wrap_v=_core.TextureWrap.clamp)
     fresnel = _core.Fresnel(_core.FresnelModel.schlick, r0=(0.9, 0.8, 0.7))
     material = scene.add_material(
         _core.Material(
@@ -66,14 +66,23 @@ def test_scene_holds_what_is_added() -> None:
             albedo_texture=texture,
             specular=True,
             fresnel=fresnel,
+            specular_texture=_core.TextureReference(texture, scale=(2, 3), rotation=0.5),
+            lobe=_core.SpecularLobe.ggx,
+            roughness=0.25,
+            roughness_texture=texture,
+            exponent=20.0,
             layers=_core.LayerModel.coated,
             emission=(0, 0, 1),
+            emission_texture=_core.TextureReference(texture, offset=(0.25, 0.5)),
         )
     )
     mesh = _core.TriangleMesh(TRIANGLE, np.array([[0, 1, 2], [2, 1, 0]]), parts=np.array([0, 1]))
     assert scene.add_object("sail", mesh, material, ["front", "back"]) == 0
     assert scene.add_rectangle_light((0, 1, 0), (1, 0, 0), (0, 0, 1), (3, 3, 3)) == 0
     assert scene.add_point_light((0, 2, 0), (1, 1, 1)) == 0
+    assert scene.add_sphere_light((0, 2, 0), 0.1, (1, 1, 1)) == 0
+    assert scene.add_directional_light((0, -1, 0), (1, 1, 1)) == 0
+    assert scene.add_spot_light((0, 2, 0), (0, -1, 0), (1, 1, 1), 10, outer_degrees=20) == 0
     scene.set_environment(np.ones((4, 8, 3), dtype=np.float32), scale=2.0, rotation_degrees=30.0)
     scene.validate()
 
@@ -87,6 +96,12 @@ def test_scene_holds_what_is_added() -> None:
     assert back.fresnel.model == _core.FresnelModel.schlick
     np.testing.assert_allclose(back.fresnel.r0, (0.9, 0.8, 0.7), rtol=1e-7)
     assert back.layers == _core.LayerModel.coated
+    assert back.albedo_texture == _core.TextureReference(texture)
+    assert (back.specular_texture.scale, back.specular_texture.rotation) == ((2, 3), 0.5)
+    assert (back.lobe, back.roughness, back.exponent) == (_core.SpecularLobe.ggx, 0.25, 20.0)
+    assert back.roughness_texture.texture == texture
+    assert back.emission_texture.offset == (0.25, 0.5)
+    assert repr(back.roughness_texture).startswith("TextureReference(0, offset=(0.0")
     back.fresnel = _core.Fresnel(_core.FresnelModel.conductor, eta=(0.2, 0.9, 1.1), k=(3.9, 2.4, 2.2))
     scene.set_material(0, back)
     assert scene.material(0).fresnel.model == _core.FresnelModel.conductor
@@ -103,6 +118,28 @@ def test_scene_errors_name_the_culprit() -> None:
         scene.bounds(7)
     with pytest.raises(TypeError):
         scene.add_texture(np.zeros((2, 2, 4), dtype=np.float32))
+
+
+def test_objects_are_seen_by_a_set_of_rays() -> None:
+    scene = _core.Scene()
+    matte = scene.add_material(_core.Material())
+    mesh = _core.TriangleMesh(TRIANGLE, INDICES)
+    visibility = _core.Visibility.reflection | _core.Visibility.shadow
+    scene.add_object("sail", mesh, matte)
+    scene.add_object("ghost", mesh, matte, visibility=visibility)
+    assert scene.object_visibility(0) == _core.Visibility.all
+    assert scene.object_visibility(1) == visibility
+    scene.set_object_visibility(1, _core.Visibility.none)
+    assert _core.Visibility.camera not in scene.object_visibility(1)
+    with pytest.raises(_core.InvalidArgument, match="object is 2"):
+        scene.set_object_visibility(2, visibility)
+
+
+def test_lights_that_cannot_be_are_named() -> None:
+    scene = _core.Scene()
+    scene.add_spot_light((0, 2, 0), (0, -1, 0), (1, 1, 1), inner_degrees=50)
+    with pytest.raises(_core.InvalidArgument, match="spot light 0 inner_degrees is 50"):
+        scene.validate()
 
 
 def test_load_mesh_reads_a_file_and_names_what_is_wrong_with_it(tmp_path: Path) -> None:

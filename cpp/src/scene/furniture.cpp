@@ -38,7 +38,7 @@ Furnisher::Furnisher(Scene& scene) : scene_(scene), oak_(0), walnut_(0), white_p
 }
 
 int Furnisher::texture(Image image) {
-  scene_.textures.push_back(std::move(image));
+  scene_.textures.push_back({std::move(image)});
   return static_cast<int>(scene_.textures.size()) - 1;
 }
 
@@ -52,7 +52,7 @@ int Furnisher::matte(std::string name, glm::vec3 albedo) {
 
 int Furnisher::matte(std::string name, int albedo_texture) {
   const int material = matte(std::move(name), glm::vec3(1.0F));
-  scene_.materials.back().albedo_texture = albedo_texture;
+  scene_.materials.back().albedo_texture.texture = albedo_texture;
   return material;
 }
 

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <string>
 #include <string_view>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 
@@ -18,6 +20,7 @@ constexpr float kMaxCoordinate = 1e12F;
 constexpr float kNormalTolerance = 1e-2F;
 
 std::string text(float v) { return std::to_string(v); }
+std::string text(glm::vec2 v) { return "(" + text(v.x) + ", " + text(v.y) + ")"; }
 std::string text(glm::vec3 v) { return "(" + text(v.x) + ", " + text(v.y) + ", " + text(v.z) + ")"; }
 
 bool is_finite(float v) { return std::isfinite(v); }
@@ -28,6 +31,7 @@ bool is_finite(glm::vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) &&
 bool in_unit_interval(glm::vec3 v) {
   return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x <= 1 && v.y <= 1 && v.z <= 1;
 }
+bool is_unit(glm::vec3 v) { return std::abs(glm::length(v) - 1.0F) <= kNormalTolerance; }
 bool is_finite_positive(glm::vec3 v) { return is_finite(v) && v.x > 0 && v.y > 0 && v.z > 0; }
 bool is_finite_nonnegative(glm::vec3 v) { return is_finite(v) && v.x >= 0 && v.y >= 0 && v.z >= 0; }
 
@@ -37,32 +41,52 @@ std::string label(std::string_view kind, std::size_t index, std::string_view nam
   return result;
 }
 
-void check_image(const std::string& where, const Image& image) {
+void check_pixel_count(const std::string& where, const Image& image) {
   if (image.width < 1 || image.height < 1) {
     throw InvalidArgument(where,
                           std::to_string(image.width) + " × " + std::to_string(image.height) + " pixels",
                           "at least one pixel");
   }
-  if (image.channel_count() != 3) {
-    throw InvalidArgument(where + " channel count", std::to_string(image.channel_count()), "3");
-  }
   const std::size_t count =
-      static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) * 3;
+      static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) * image.channels.size();
   if (image.pixels.size() != count) {
     throw InvalidArgument(where + " number of values", std::to_string(image.pixels.size()),
                           std::to_string(count));
   }
 }
 
+void check_channel_count(const std::string& where, const Image& image, std::initializer_list<int> expected) {
+  std::string list;
+  for (const int count : expected) {
+    if (image.channel_count() == count) return;
+    list += (list.empty() ? "" : " or ") + std::to_string(count);
+  }
+  throw InvalidArgument(where + " channel count", std::to_string(image.channel_count()), list);
+}
+
 void check_texels(const std::string& where, const Image& image, float maximum, std::string_view expected) {
   for (std::size_t i = 0; i < image.pixels.size(); ++i) {
     const float v = image.pixels[i];
     if (v >= 0.0F && v <= maximum) continue;
-    const std::size_t pixel = i / 3;
+    const std::size_t channels = image.channels.size();
+    const std::size_t pixel = i / channels;
     const std::size_t width = static_cast<std::size_t>(image.width);
     throw InvalidArgument(where + " pixel (" + std::to_string(pixel % width) + ", " +
                               std::to_string(pixel / width) + ") channel " + std::to_string(i % 3),
                           text(v), expected);
+  }
+}
+
+void check_reference(const Scene& scene, const std::string& where, const TextureReference& reference) {
+  if (reference.texture < -1 || reference.texture >= static_cast<int>(scene.textures.size())) {
+    throw InvalidArgument(where, std::to_string(reference.texture),
+                          "-1 or an index below " + std::to_string(scene.textures.size()));
+  }
+  if (!is_finite(reference.offset) || !is_finite(reference.scale) || !is_finite(reference.rotation)) {
+    throw InvalidArgument(where + " transform",
+                          "offset " + text(reference.offset) + ", scale " + text(reference.scale) +
+                              ", rotation " + text(reference.rotation),
+                          "finite values");
   }
 }
 
@@ -72,14 +96,20 @@ void check_material(const Scene& scene, std::size_t index) {
   if (!in_unit_interval(material.albedo)) {
     throw InvalidArgument(where + " albedo", text(material.albedo), "values in [0, 1]");
   }
-  if (material.albedo_texture < -1 || material.albedo_texture >= static_cast<int>(scene.textures.size())) {
-    throw InvalidArgument(where + " albedo_texture", std::to_string(material.albedo_texture),
-                          "-1 or an index below " + std::to_string(scene.textures.size()));
-  }
+  check_reference(scene, where + " albedo_texture", material.albedo_texture);
   if (!is_finite_nonnegative(material.emission)) {
     throw InvalidArgument(where + " emission", text(material.emission), "finite values of at least 0");
   }
+  check_reference(scene, where + " emission_texture", material.emission_texture);
   if (!material.specular) return;
+  check_reference(scene, where + " specular_texture", material.specular_texture);
+  check_reference(scene, where + " roughness_texture", material.roughness_texture);
+  if (material.lobe == SpecularLobe::ggx && !(material.roughness > 0.0F && material.roughness <= 1.0F)) {
+    throw InvalidArgument(where + " roughness", text(material.roughness), "a value in (0, 1]");
+  }
+  if (material.lobe == SpecularLobe::phong && !(material.exponent >= 1.0F && material.exponent <= 1e6F)) {
+    throw InvalidArgument(where + " exponent", text(material.exponent), "a value in [1, 1e6]");
+  }
   const Fresnel& fresnel = material.fresnel;
   switch (fresnel.model) {
     case FresnelModel::constant:
@@ -124,7 +154,7 @@ void check_mesh(const std::string& where, const TriangleMesh& mesh, std::size_t 
                           "0 or the vertex count " + std::to_string(vertex_count));
   }
   for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
-    if (!(std::abs(glm::length(mesh.normals[i]) - 1.0F) <= kNormalTolerance)) {
+    if (!is_unit(mesh.normals[i])) {
       throw InvalidArgument(where + " normal " + std::to_string(i), text(mesh.normals[i]), "a unit vector");
     }
   }
@@ -134,8 +164,7 @@ void check_mesh(const std::string& where, const TriangleMesh& mesh, std::size_t 
   }
   for (std::size_t i = 0; i < mesh.uvs.size(); ++i) {
     if (!is_finite(mesh.uvs[i])) {
-      throw InvalidArgument(where + " uv " + std::to_string(i),
-                            "(" + text(mesh.uvs[i].x) + ", " + text(mesh.uvs[i].y) + ")", "finite values");
+      throw InvalidArgument(where + " uv " + std::to_string(i), text(mesh.uvs[i]), "finite values");
     }
   }
   double area = 0.0;
@@ -173,30 +202,63 @@ void check_object(const Scene& scene, std::size_t index) {
   check_mesh(where, object.mesh, std::max<std::size_t>(1, object.part_names.size()));
 }
 
-void check_light(const std::string& where, const RectangleLight& light) {
-  if (!is_finite(light.corner))
-    throw InvalidArgument(where + " corner", text(light.corner), "finite coordinates");
-  if (!is_finite(light.edge_u))
-    throw InvalidArgument(where + " edge_u", text(light.edge_u), "finite coordinates");
-  if (!is_finite(light.edge_v))
-    throw InvalidArgument(where + " edge_v", text(light.edge_v), "finite coordinates");
-  const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
-  if (!(area > 0.0)) throw InvalidArgument(where + " area", std::to_string(area), "edges that span an area");
-  if (!is_finite_nonnegative(light.radiance)) {
-    throw InvalidArgument(where + " radiance", text(light.radiance), "finite values of at least 0");
+void check_position(const std::string& where, glm::vec3 position) {
+  if (!is_finite(position)) throw InvalidArgument(where, text(position), "finite coordinates");
+}
+
+void check_radiance(const std::string& where, glm::vec3 radiance) {
+  if (!is_finite_nonnegative(radiance)) {
+    throw InvalidArgument(where, text(radiance), "finite values of at least 0");
   }
 }
 
+void check_direction(const std::string& where, glm::vec3 direction) {
+  if (!is_unit(direction)) throw InvalidArgument(where, text(direction), "a unit vector");
+}
+
+void check_light(const std::string& where, const RectangleLight& light) {
+  check_position(where + " corner", light.corner);
+  check_position(where + " edge_u", light.edge_u);
+  check_position(where + " edge_v", light.edge_v);
+  const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
+  if (!(area > 0.0)) throw InvalidArgument(where + " area", std::to_string(area), "edges that span an area");
+  check_radiance(where + " radiance", light.radiance);
+}
+
+void check_light(const std::string& where, const SphereLight& light) {
+  check_position(where + " centre", light.centre);
+  if (!(light.radius > 0.0F && light.radius <= kMaxCoordinate)) {
+    throw InvalidArgument(where + " radius", text(light.radius), "a length in (0, 1e12]");
+  }
+  check_radiance(where + " radiance", light.radiance);
+}
+
 void check_light(const std::string& where, const PointLight& light) {
-  if (!is_finite(light.position))
-    throw InvalidArgument(where + " position", text(light.position), "finite coordinates");
-  if (!is_finite_nonnegative(light.intensity)) {
-    throw InvalidArgument(where + " intensity", text(light.intensity), "finite values of at least 0");
+  check_position(where + " position", light.position);
+  check_radiance(where + " intensity", light.intensity);
+}
+
+void check_light(const std::string& where, const DirectionalLight& light) {
+  check_direction(where + " direction", light.direction);
+  check_radiance(where + " irradiance", light.irradiance);
+}
+
+void check_light(const std::string& where, const SpotLight& light) {
+  check_position(where + " position", light.position);
+  check_direction(where + " direction", light.direction);
+  check_radiance(where + " intensity", light.intensity);
+  if (!(light.outer_degrees > 0.0F && light.outer_degrees <= 90.0F)) {
+    throw InvalidArgument(where + " outer_degrees", text(light.outer_degrees), "an angle in (0, 90]");
+  }
+  if (!(light.inner_degrees >= 0.0F && light.inner_degrees < light.outer_degrees)) {
+    throw InvalidArgument(where + " inner_degrees", text(light.inner_degrees),
+                          "an angle from 0 to below outer_degrees, " + text(light.outer_degrees));
   }
 }
 
 void check_light(const std::string& where, const EnvironmentLight& light) {
-  check_image(where + " panorama", light.panorama);
+  check_pixel_count(where + " panorama", light.panorama);
+  check_channel_count(where + " panorama", light.panorama, {3});
   check_texels(where + " panorama", light.panorama, std::numeric_limits<float>::max(),
                "a finite value of at least 0");
   if (!(light.scale >= 0.0F) || !is_finite(light.scale)) {
@@ -209,20 +271,30 @@ void check_light(const std::string& where, const EnvironmentLight& light) {
 
 }  // namespace
 
+float spot_falloff(const SpotLight& light, float cosine) {
+  const float inner = std::cos(glm::radians(light.inner_degrees));
+  const float outer = std::cos(glm::radians(light.outer_degrees));
+  const float ramp = std::clamp((cosine - outer) / std::max(0.001F, inner - outer), 0.0F, 1.0F);
+  return ramp * ramp;
+}
+
 void validate(const Scene& scene) {
   for (std::size_t i = 0; i < scene.textures.size(); ++i) {
     const std::string where = label("texture", i, "");
-    check_image(where, scene.textures[i]);
-    check_texels(where, scene.textures[i], 1.0F, "a value in [0, 1]");
+    check_channel_count(where, scene.textures[i].image, {1, 3});
+    check_pixel_count(where, scene.textures[i].image);
+    check_texels(where, scene.textures[i].image, 1.0F, "a value in [0, 1]");
   }
   for (std::size_t i = 0; i < scene.materials.size(); ++i) check_material(scene, i);
   for (std::size_t i = 0; i < scene.objects.size(); ++i) check_object(scene, i);
-  for (std::size_t i = 0; i < scene.rectangle_lights.size(); ++i) {
-    check_light(label("rectangle light", i, ""), scene.rectangle_lights[i]);
-  }
-  for (std::size_t i = 0; i < scene.point_lights.size(); ++i) {
-    check_light(label("point light", i, ""), scene.point_lights[i]);
-  }
+  const auto check_lights = [](std::string_view kind, const auto& lights) {
+    for (std::size_t i = 0; i < lights.size(); ++i) check_light(label(kind, i, ""), lights[i]);
+  };
+  check_lights("rectangle light", scene.rectangle_lights);
+  check_lights("sphere light", scene.sphere_lights);
+  check_lights("point light", scene.point_lights);
+  check_lights("directional light", scene.directional_lights);
+  check_lights("spot light", scene.spot_lights);
   if (scene.environment) check_light("environment", *scene.environment);
 }
 

@@ -40,23 +40,15 @@ glm::vec3 triangle_normal(glm::vec3 a, glm::vec3 b, glm::vec3 c) {
   return length > 0.0 ? glm::vec3(exact / length) : glm::vec3(0.0F);
 }
 
-glm::vec3 texture_lookup(const Image& texture, glm::vec2 uv) {
-  const auto wrap = [](float x) { return x - std::floor(x); };
-  const float x = wrap(uv.x) * static_cast<float>(texture.width) - 0.5F;
-  const float y = (1.0F - wrap(uv.y)) * static_cast<float>(texture.height) - 0.5F;
-  const auto x0 = static_cast<int>(std::floor(x));
-  const auto y0 = static_cast<int>(std::floor(y));
-  const float fx = x - static_cast<float>(x0);
-  const float fy = y - static_cast<float>(y0);
-  const auto texel = [&](int i, int j) {
-    i = i < 0 ? i + texture.width : (i >= texture.width ? i - texture.width : i);
-    j = j < 0 ? j + texture.height : (j >= texture.height ? j - texture.height : j);
-    const float* p = texture.at(i, j);
-    return glm::vec3(p[0], p[1], p[2]);
-  };
-  return (1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
-         fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
+namespace {
+
+glm::vec2 uv_at(const TriangleMesh& mesh, glm::uvec3 corner, const Hit& hit) {
+  if (mesh.uvs.empty()) return glm::vec2(0.0F);
+  return (1.0F - hit.u - hit.v) * mesh.uvs[corner.x] + hit.u * mesh.uvs[corner.y] +
+         hit.v * mesh.uvs[corner.z];
 }
+
+}  // namespace
 
 Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm::vec3 ray_direction) {
   Surface s;
@@ -98,11 +90,8 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
   }
 
   s.albedo = s.material->albedo;
-  if (s.material->albedo_texture >= 0 && s.albedo != glm::vec3(0.0F)) {
-    glm::vec2 uv(0.0F);
-    if (!mesh.uvs.empty())
-      uv = w * mesh.uvs[corner.x] + hit.u * mesh.uvs[corner.y] + hit.v * mesh.uvs[corner.z];
-    s.albedo *= texture_lookup(scene.textures[static_cast<std::size_t>(s.material->albedo_texture)], uv);
+  if (s.material->albedo_texture.texture >= 0 && s.albedo != glm::vec3(0.0F)) {
+    s.albedo *= texture_lookup(scene, s.material->albedo_texture, uv_at(mesh, corner, hit));
   }
   if (s.material->specular) {
     s.normal = bend_normal(s.view, s.normal, s.geometric_normal);

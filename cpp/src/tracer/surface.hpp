@@ -50,9 +50,6 @@ SurfaceDifferential surface_differential(const Scene& scene, const RayScene& ray
 /// Unit normal of the side from which the corners are counter-clockwise; 0 if the triangle has no area.
 glm::vec3 triangle_normal(glm::vec3 a, glm::vec3 b, glm::vec3 c);
 
-/// Bilinear, repeating lookup with v up.
-glm::vec3 texture_lookup(const Image& texture, glm::vec2 uv);
-
 inline float luminance(glm::vec3 c) { return 0.2126F * c.x + 0.7152F * c.y + 0.0722F * c.z; }
 
 }  // namespace mirrorbake::tracing

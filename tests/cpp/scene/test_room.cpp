@@ -84,7 +84,7 @@ TEST(Room, FourWallsFaceInwardsWithFourTextures) {
   std::set<int> textures;
   for (const char* name : {"north wall", "east wall", "south wall", "west wall"}) {
     const Object& wall = object_named(scene, name);
-    textures.insert(scene.materials[static_cast<std::size_t>(wall.material)].albedo_texture);
+    textures.insert(scene.materials[static_cast<std::size_t>(wall.material)].albedo_texture.texture);
     for (std::size_t i = 0; i < wall.mesh.positions.size(); ++i) {
       EXPECT_LT(glm::dot(wall.mesh.positions[i], wall.mesh.normals[i]), 0.0F) << name;
     }
@@ -106,7 +106,8 @@ TEST(Room, IsTheSameEveryTime) {
   const Scene& a = room();
   const Scene b = make_room();
   ASSERT_EQ(a.textures.size(), b.textures.size());
-  for (std::size_t i = 0; i < a.textures.size(); ++i) EXPECT_EQ(a.textures[i].pixels, b.textures[i].pixels);
+  for (std::size_t i = 0; i < a.textures.size(); ++i)
+    EXPECT_EQ(a.textures[i].image.pixels, b.textures[i].image.pixels);
   ASSERT_EQ(a.objects.size(), b.objects.size());
   for (std::size_t i = 0; i < a.objects.size(); ++i)
     EXPECT_EQ(a.objects[i].mesh.positions, b.objects[i].mesh.positions);

@@ -21,10 +21,14 @@ Scene complete_scene() {
   Scene scene;
   Image texture(2, 1, {"R", "G", "B"});
   texture.pixels = {0.0F, 0.5F, 1.0F, 1.0F, 0.5F, 0.0F};
-  scene.textures.push_back(texture);
+  scene.textures.push_back({texture});
   Material material;
   material.name = "chrome";
-  material.albedo_texture = 0;
+  material.albedo_texture.texture = 0;
+  material.specular_texture.texture = 0;
+  material.lobe = SpecularLobe::ggx;
+  material.roughness_texture.texture = 0;
+  material.emission_texture.texture = 0;
   material.specular = true;
   material.fresnel = {FresnelModel::conductor, glm::vec3(0.0F), glm::vec3(3.1F), glm::vec3(3.3F)};
   scene.materials.push_back(material);
@@ -38,7 +42,10 @@ Scene complete_scene() {
   object.part_names = {"cloth", "seam"};
   scene.objects.push_back(object);
   scene.rectangle_lights.push_back({});
+  scene.sphere_lights.push_back({});
   scene.point_lights.push_back({});
+  scene.directional_lights.push_back({});
+  scene.spot_lights.push_back({});
   scene.environment = EnvironmentLight{texture, 1.0F, 0.0F};
   return scene;
 }
@@ -51,19 +58,42 @@ struct Defect {
 TEST(Scene, ValidationAcceptsACompleteSceneAndAnEmptyOne) {
   EXPECT_NO_THROW(validate(complete_scene()));
   EXPECT_NO_THROW(validate(Scene{}));
+  Scene grey = complete_scene();
+  grey.textures[0].image = Image(2, 1, {"Y"});
+  EXPECT_NO_THROW(validate(grey));
 }
 
 TEST(Scene, ValidationNamesTheThingAndTheFieldThatIsWrong) {
   const std::vector<Defect> defects = {
-      {"texture 0 channel count is 1", [](Scene& s) { s.textures[0].channels = {"Y"}; }},
-      {"texture 0 number of values is 5", [](Scene& s) { s.textures[0].pixels.pop_back(); }},
-      {"texture 0 is 0 × 1 pixels", [](Scene& s) { s.textures[0].width = 0; }},
-      {"texture 0 pixel (1, 0) channel 2 is 1.5", [](Scene& s) { s.textures[0].pixels[5] = 1.5F; }},
-      {"texture 0 pixel (0, 0) channel 0 is nan", [](Scene& s) { s.textures[0].pixels[0] = kNan; }},
+      {"texture 0 channel count is 2",
+       [](Scene& s) {
+         s.textures[0].image.channels = {"Y", "A"};
+       }},
+      {"texture 0 number of values is 5", [](Scene& s) { s.textures[0].image.pixels.pop_back(); }},
+      {"texture 0 is 0 × 1 pixels", [](Scene& s) { s.textures[0].image.width = 0; }},
+      {"texture 0 pixel (1, 0) channel 2 is 1.5", [](Scene& s) { s.textures[0].image.pixels[5] = 1.5F; }},
+      {"texture 0 pixel (0, 0) channel 0 is nan", [](Scene& s) { s.textures[0].image.pixels[0] = kNan; }},
       {"material 0 'chrome' albedo is", [](Scene& s) { s.materials[0].albedo.y = 1.01F; }},
       {"material 0 'chrome' albedo is", [](Scene& s) { s.materials[0].albedo.z = kNan; }},
-      {"material 0 'chrome' albedo_texture is 1", [](Scene& s) { s.materials[0].albedo_texture = 1; }},
-      {"material 0 'chrome' albedo_texture is -2", [](Scene& s) { s.materials[0].albedo_texture = -2; }},
+      {"material 0 'chrome' albedo_texture is 1",
+       [](Scene& s) { s.materials[0].albedo_texture.texture = 1; }},
+      {"material 0 'chrome' albedo_texture is -2",
+       [](Scene& s) { s.materials[0].albedo_texture.texture = -2; }},
+      {"material 0 'chrome' albedo_texture transform is offset",
+       [](Scene& s) { s.materials[0].albedo_texture.offset.x = kNan; }},
+      {"material 0 'chrome' specular_texture transform is offset",
+       [](Scene& s) { s.materials[0].specular_texture.rotation = kInf; }},
+      {"material 0 'chrome' roughness_texture is 7",
+       [](Scene& s) { s.materials[0].roughness_texture.texture = 7; }},
+      {"material 0 'chrome' emission_texture is 7",
+       [](Scene& s) { s.materials[0].emission_texture.texture = 7; }},
+      {"material 0 'chrome' roughness is 0", [](Scene& s) { s.materials[0].roughness = 0.0F; }},
+      {"material 0 'chrome' roughness is 1.01", [](Scene& s) { s.materials[0].roughness = 1.01F; }},
+      {"material 0 'chrome' exponent is 0.5",
+       [](Scene& s) {
+         s.materials[0].lobe = SpecularLobe::phong;
+         s.materials[0].exponent = 0.5F;
+       }},
       {"material 0 'chrome' emission is", [](Scene& s) { s.materials[0].emission.x = -1.0F; }},
       {"material 0 'chrome' fresnel k is", [](Scene& s) { s.materials[0].fresnel.k.x = -0.1F; }},
       {"material 0 'chrome' fresnel eta is", [](Scene& s) { s.materials[0].fresnel.eta.x = 0.0F; }},
@@ -100,6 +130,17 @@ TEST(Scene, ValidationNamesTheThingAndTheFieldThatIsWrong) {
       {"rectangle light 0 area is 0",
        [](Scene& s) { s.rectangle_lights[0].edge_v = 2.0F * s.rectangle_lights[0].edge_u; }},
       {"rectangle light 0 radiance is", [](Scene& s) { s.rectangle_lights[0].radiance.x = -1.0F; }},
+      {"sphere light 0 centre is", [](Scene& s) { s.sphere_lights[0].centre.x = kInf; }},
+      {"sphere light 0 radius is 0", [](Scene& s) { s.sphere_lights[0].radius = 0.0F; }},
+      {"sphere light 0 radiance is", [](Scene& s) { s.sphere_lights[0].radiance.y = kNan; }},
+      {"directional light 0 direction is", [](Scene& s) { s.directional_lights[0].direction.y = -2.0F; }},
+      {"directional light 0 irradiance is", [](Scene& s) { s.directional_lights[0].irradiance.y = -2.0F; }},
+      {"spot light 0 position is", [](Scene& s) { s.spot_lights[0].position.y = kNan; }},
+      {"spot light 0 direction is", [](Scene& s) { s.spot_lights[0].direction = glm::vec3(0.0F); }},
+      {"spot light 0 intensity is", [](Scene& s) { s.spot_lights[0].intensity.x = kInf; }},
+      {"spot light 0 outer_degrees is 90.5", [](Scene& s) { s.spot_lights[0].outer_degrees = 90.5F; }},
+      {"spot light 0 inner_degrees is 45", [](Scene& s) { s.spot_lights[0].inner_degrees = 45.0F; }},
+      {"spot light 0 inner_degrees is nan", [](Scene& s) { s.spot_lights[0].inner_degrees = kNan; }},
       {"point light 0 position is", [](Scene& s) { s.point_lights[0].position.x = kNan; }},
       {"point light 0 intensity is", [](Scene& s) { s.point_lights[0].intensity.z = kInf; }},
       {"environment panorama pixel (0, 0) channel 1 is",
@@ -126,6 +167,14 @@ TEST(Scene, ValidationIgnoresTheFresnelParametersOfAMatteMaterial) {
   Scene scene = complete_scene();
   scene.materials[0].specular = false;
   scene.materials[0].fresnel.eta = glm::vec3(-1.0F);
+  EXPECT_NO_THROW(validate(scene));
+}
+
+TEST(Scene, ValidationIgnoresTheParametersOfLobesThatAMaterialDoesNotHave) {
+  Scene scene = complete_scene();
+  scene.materials[0].lobe = SpecularLobe::mirror;
+  scene.materials[0].roughness = 0.0F;
+  scene.materials[0].exponent = 0.0F;
   EXPECT_NO_THROW(validate(scene));
 }
 

@@ -22,19 +22,73 @@ struct TriangleMesh {
   std::vector<std::uint16_t> parts;   ///< part of each triangle; empty: all belong to part 0
 };
 
+/// How a coordinate outside [0,1] finds a texel: tiled, the border's, or tiled with every second tile mirrored.
+enum class TextureWrap { repeat, clamp, mirror };
+
+/// Texels that materials refer to.
+struct Texture {
+  Image image;  ///< one channel, which stands for all three, or R, G, B; scene-linear
+  TextureWrap wrap_u = TextureWrap::repeat;
+  TextureWrap wrap_v = TextureWrap::repeat;
+};
+
+/// A use of a texture. The texture coordinates are transformed as KHR_texture_transform defines it, in that
+/// extension's coordinates, whose v counts downwards: scaled, turned counter-clockwise about (0, 0), moved.
+struct TextureReference {
+  int texture = -1;  ///< index into Scene::textures; −1: none
+  glm::vec2 offset{0.0F};
+  glm::vec2 scale{1.0F};
+  float rotation = 0.0F;  ///< radians
+
+  bool operator==(const TextureReference&) const = default;
+};
+
+/// The coordinates, v up, at which a texture is looked up for a mesh's coordinates `uv`, v up.
+glm::vec2 texture_coordinates(const TextureReference& reference, glm::vec2 uv);
+
+/// Texels around a point, interpolated bilinearly; `uv`, v up, are the texture's own coordinates.
+glm::vec3 texture_lookup(const Texture& texture, glm::vec2 uv);
+
+/// Shape of the specular lobe about the mirror direction: a perfect mirror; microfacets with normals distributed
+/// after Trowbridge and Reitz (GGX; Walter et al., "Microfacet models for refraction through rough surfaces", EGSR
+/// 2007); or (r·l)^N, normalised ([EMT] eq. 17).
+enum class SpecularLobe { mirror, ggx, phong };
+
 /// How diffuse and specular light add up ([EMT] §3; spec F5): `additive` is F·L_m + L_d, `coated` is
 /// F·L_m + (1−F)·L_d, for a diffuse body under a clear coat.
 enum class LayerModel { additive, coated };
 
 struct Material {
   std::string name;
-  glm::vec3 albedo{0.5F};   ///< Lambertian reflectance, in [0,1]
-  int albedo_texture = -1;  ///< index into Scene::textures, multiplied with `albedo`; −1: none
-  bool specular = false;    ///< has a mirror lobe, weighted by `fresnel`
+  glm::vec3 albedo{0.5F};           ///< Lambertian reflectance, in [0,1]
+  TextureReference albedo_texture;  ///< multiplies `albedo`
+  bool specular = false;            ///< has a specular lobe, weighted by `fresnel`
   Fresnel fresnel;
+  TextureReference specular_texture;  ///< multiplies fresnel.r0; for constant and Schlick's reflectance only
+  SpecularLobe lobe = SpecularLobe::mirror;
+  float roughness = 0.1F;              ///< of the lobe `ggx`: its α, in (0,1]
+  TextureReference roughness_texture;  ///< its first channel multiplies `roughness`
+  float exponent = 100.0F;             ///< of the lobe `phong`: N, in [1, 1e6]
   LayerModel layers = LayerModel::additive;
-  glm::vec3 emission{0.0F};  ///< radiance emitted on the front side, W sr⁻¹ m⁻²
+  glm::vec3 emission{0.0F};           ///< radiance emitted on the front side, W sr⁻¹ m⁻²
+  TextureReference emission_texture;  ///< multiplies `emission`
 };
+
+/// A set of the kinds of rays that see an object.
+enum class Visibility : std::uint8_t {
+  none = 0,
+  camera = 1,      ///< rays from the eye, and those of a capture
+  reflection = 2,  ///< rays that leave a surface, specular or diffuse
+  shadow = 4,      ///< rays towards a light
+  all = 7
+};
+
+constexpr Visibility operator|(Visibility a, Visibility b) {
+  return static_cast<Visibility>(static_cast<std::uint8_t>(a) | static_cast<std::uint8_t>(b));
+}
+constexpr Visibility operator&(Visibility a, Visibility b) {
+  return static_cast<Visibility>(static_cast<std::uint8_t>(a) & static_cast<std::uint8_t>(b));
+}
 
 /// One thing of the scene: what a capture hides, and what a reflector is, are objects.
 struct Object {
@@ -42,10 +96,11 @@ struct Object {
   TriangleMesh mesh;                    ///< in world space
   int material = 0;                     ///< index into Scene::materials
   std::vector<std::string> part_names;  ///< e.g. {"body", "lid"}; empty: one part, named as the object
+  Visibility visibility = Visibility::all;
 };
 
 /// A one-sided rectangle `corner + a·edge_u + b·edge_v`, a and b in [0,1], that emits along edge_u × edge_v.
-/// It is visible to rays.
+/// It is visible to rays. Meshes emit too: by their material's emission.
 struct RectangleLight {
   glm::vec3 corner{0.0F};
   glm::vec3 edge_u{1.0F, 0.0F, 0.0F};
@@ -58,6 +113,33 @@ struct PointLight {
   glm::vec3 intensity{1.0F};  ///< W sr⁻¹
 };
 
+/// A sphere that emits outwards. It is visible to rays.
+struct SphereLight {
+  glm::vec3 centre{0.0F};
+  float radius = 0.1F;
+  glm::vec3 radiance{1.0F};  ///< W sr⁻¹ m⁻²
+};
+
+/// Parallel light from infinity.
+struct DirectionalLight {
+  glm::vec3 direction{0.0F, -1.0F, 0.0F};  ///< unit, the way the light travels
+  glm::vec3 irradiance{1.0F};              ///< of a surface that faces it, W m⁻²
+};
+
+/// A point that shines into a cone. Angles are measured from its axis: the intensity is full up to `inner_degrees`
+/// and falls to 0 at `outer_degrees`, between them as KHR_lights_punctual has it.
+struct SpotLight {
+  glm::vec3 position{0.0F};
+  glm::vec3 direction{0.0F, -1.0F, 0.0F};  ///< unit, the axis, the way the light travels
+  glm::vec3 intensity{1.0F};               ///< along the axis, W sr⁻¹
+  float inner_degrees = 0.0F;              ///< in [0, outer_degrees)
+  float outer_degrees = 45.0F;             ///< in (0, 90]
+};
+
+/// The part of a spot light's intensity that it sends at an angle to its axis, in [0,1]. `cosine` is that angle's.
+/// The square of a ramp over the cosine, from KHR_lights_punctual, "Inner and Outer Cone Angles".
+float spot_falloff(const SpotLight& light, float cosine);
+
 /// Radiance from infinity, a latitude-longitude panorama: its centre looks along −Z, +X is to the right of
 /// the centre, +Y is the top row.
 struct EnvironmentLight {
@@ -69,15 +151,22 @@ struct EnvironmentLight {
 struct Scene {
   std::vector<Object> objects;
   std::vector<Material> materials;
-  std::vector<Image> textures;  ///< three channels, scene-linear, repeating
+  std::vector<Texture> textures;
   std::vector<RectangleLight> rectangle_lights;
+  std::vector<SphereLight> sphere_lights;
   std::vector<PointLight> point_lights;
+  std::vector<DirectionalLight> directional_lights;
+  std::vector<SpotLight> spot_lights;
   std::optional<EnvironmentLight> environment;
 };
 
+/// Value of a texture, which must be in the scene, for a mesh's coordinates `uv`, v up.
+glm::vec3 texture_lookup(const Scene& scene, const TextureReference& reference, glm::vec2 uv);
+
 /// Throws InvalidArgument if anything in the scene is unusable: indices out of range, arrays of unequal
 /// length, vertices that are not finite or beyond ±1e12, normals that are not unit vectors, a mesh without
-/// area (single triangles may be degenerate), albedo, texels or reflectance outside [0,1], negative radiance.
+/// area (single triangles may be degenerate), albedo, texels or reflectance outside [0,1], a lobe's roughness or
+/// exponent out of range, negative radiance, directions of lights that are not unit vectors, cones out of order.
 /// The message names the object, material, texture or light, the field, its value and what was expected.
 void validate(const Scene& scene);
 

@@ -1,0 +1,60 @@
+#include <algorithm>
+#include <cmath>
+
+#include "mirrorbake/scene/scene.hpp"
+
+namespace mirrorbake {
+namespace {
+
+// The coordinate in [0,1] that finds the same texels.
+float wrapped(float x, TextureWrap wrap) {
+  if (!std::isfinite(x)) return 0.0F;  // a transform of large coordinates may overflow
+  if (wrap == TextureWrap::repeat) return x - std::floor(x);
+  if (wrap == TextureWrap::clamp) return std::clamp(x, 0.0F, 1.0F);
+  return 1.0F - std::abs(x - 2.0F * std::floor(0.5F * x) - 1.0F);
+}
+
+// `i` is at most one texel outside.
+int wrapped(int i, int size, TextureWrap wrap) {
+  if (wrap == TextureWrap::repeat) return i < 0 ? i + size : (i >= size ? i - size : i);
+  return std::clamp(i, 0, size - 1);  // the mirror image of the border is the border
+}
+
+}  // namespace
+
+glm::vec2 texture_coordinates(const TextureReference& reference, glm::vec2 uv) {
+  if (reference.scale == glm::vec2(1.0F) && reference.rotation == 0.0F) {
+    return {uv.x + reference.offset.x, uv.y - reference.offset.y};
+  }
+  const float c = std::cos(reference.rotation);
+  const float s = std::sin(reference.rotation);
+  const glm::vec2 scaled = reference.scale * glm::vec2(uv.x, 1.0F - uv.y);
+  const glm::vec2 moved =
+      glm::vec2(c * scaled.x + s * scaled.y, c * scaled.y - s * scaled.x) + reference.offset;
+  return {moved.x, 1.0F - moved.y};
+}
+
+glm::vec3 texture_lookup(const Texture& texture, glm::vec2 uv) {
+  const Image& image = texture.image;
+  const float x = wrapped(uv.x, texture.wrap_u) * static_cast<float>(image.width) - 0.5F;
+  const float y = (1.0F - wrapped(uv.y, texture.wrap_v)) * static_cast<float>(image.height) - 0.5F;
+  const int x0 = static_cast<int>(std::floor(x));
+  const int y0 = static_cast<int>(std::floor(y));
+  const float fx = x - static_cast<float>(x0);
+  const float fy = y - static_cast<float>(y0);
+  const bool is_grey = image.channels.size() == 1;
+  const auto texel = [&](int i, int j) {
+    const float* p =
+        image.at(wrapped(i, image.width, texture.wrap_u), wrapped(j, image.height, texture.wrap_v));
+    return is_grey ? glm::vec3(*p) : glm::vec3(p[0], p[1], p[2]);
+  };
+  return (1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
+         fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
+}
+
+glm::vec3 texture_lookup(const Scene& scene, const TextureReference& reference, glm::vec2 uv) {
+  return texture_lookup(scene.textures[static_cast<std::size_t>(reference.texture)],
+                        texture_coordinates(reference, uv));
+}
+
+}  // namespace mirrorbake

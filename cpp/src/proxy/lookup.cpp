@@ -1,4 +1,6 @@
+#include <atomic>
 #include <string>
+#include <string_view>
 #include <variant>
 
 #include <glm/geometric.hpp>
@@ -9,6 +11,7 @@
 #include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/proxy/proxy.hpp"
+#include "vec_text.hpp"
 
 namespace mirrorbake {
 
@@ -83,15 +86,44 @@ Vector lookup_one(const Proxy& proxy, const Vector& position, const Vector& dire
   return Vector(glm::dvec3(h.x, h.y, h.z));
 }
 
-void check_lengths(const char* names, std::size_t a, std::size_t b, std::size_t c) {
-  if (a == b && b == c) return;
-  throw InvalidArgument(names,
-                        std::to_string(a) + ", " + std::to_string(b) + ", " + std::to_string(c) + " elements",
-                        "spans of one length");
+/// Throws for the first NaN or infinite value in the row, if there is one.
+template <typename Vector>
+void check_row(std::string_view name, std::span<const Vector> vectors, std::size_t row) {
+  if (detail::is_finite(vectors[row])) return;
+  throw InvalidArgument(name, detail::vec_text(vectors[row]) + " in row " + std::to_string(row), "finite");
 }
 
 /// Rays per task: some 50 µs.
 constexpr std::size_t kGrain = 16384;
+
+/// Runs `kernel(positions, seconds, lookups, count)`, which says how many it is done with, on all rays.
+template <typename Vector, typename Kernel>
+void map_rays(std::span<const Vector> positions, std::string_view second_name,
+              std::span<const Vector> seconds, std::span<Vector> lookups, Kernel kernel) {
+  const std::size_t count = positions.size();
+  if (seconds.size() != count) {
+    throw InvalidArgument(second_name, std::to_string(seconds.size()) + " elements",
+                          "as many as positions: " + std::to_string(count));
+  }
+  if (lookups.size() != count) {
+    throw InvalidArgument("lookups", std::to_string(lookups.size()) + " elements",
+                          "as many as positions: " + std::to_string(count));
+  }
+  std::atomic<std::size_t> first_left = count;
+  parallel_for(count, kGrain, [&](std::size_t begin, std::size_t end) {
+    const std::size_t done =
+        begin + kernel(&positions[begin].x, &seconds[begin].x, &lookups[begin].x, end - begin);
+    if (done == end) return;
+    std::size_t known = first_left;
+    while (done < known && !first_left.compare_exchange_weak(known, done)) {
+    }
+  });
+  // The rows of the block that was left hold what they held, even where the results replace them.
+  for (std::size_t row = first_left; row < count; ++row) {
+    check_row("positions", positions, row);
+    check_row(second_name, seconds, row);
+  }
+}
 
 }  // namespace
 
@@ -105,40 +137,32 @@ glm::dvec3 lookup_direction(const Proxy& proxy, glm::dvec3 position, glm::dvec3 
 
 void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
                        std::span<const glm::vec3> directions, std::span<glm::vec3> lookups) {
-  check_lengths("positions, directions, lookups", positions.size(), directions.size(), lookups.size());
   const LookupConstants k = constants(proxy);
-  parallel_for(positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    lookup_kernels().rays_f32(k, &positions[begin].x, &directions[begin].x, &lookups[begin].x, end - begin);
-  });
+  map_rays(positions, "directions", directions, lookups,
+           [&](const float* p, const float* d, float* l, std::size_t count) {
+             return lookup_kernels().rays_f32(k, p, d, l, count);
+           });
 }
 
 void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions,
                        std::span<const glm::dvec3> directions, std::span<glm::dvec3> lookups) {
-  check_lengths("positions, directions, lookups", positions.size(), directions.size(), lookups.size());
   const LookupConstants k = constants(proxy);
-  parallel_for(positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    lookup_kernels().rays_f64(k, &positions[begin].x, &directions[begin].x, &lookups[begin].x, end - begin);
-  });
+  map_rays(positions, "directions", directions, lookups,
+           [&](const double* p, const double* d, double* l, std::size_t count) {
+             return lookup_kernels().rays_f64(k, p, d, l, count);
+           });
 }
 
 void mirror_lookups(const Proxy& proxy, glm::vec3 eye, std::span<const glm::vec3> positions,
                     std::span<const glm::vec3> normals, std::span<glm::vec3> lookups) {
-  check_lengths("positions, normals, lookups", positions.size(), normals.size(), lookups.size());
+  if (!detail::is_finite(eye)) throw InvalidArgument("eye", detail::vec_text(eye), "finite");
   const LookupConstants k = constants(proxy);
   double e[3];
   set(e, eye);
-  parallel_for(positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    lookup_kernels().mirrors_f32(k, e, &positions[begin].x, &normals[begin].x, &lookups[begin].x,
-                                 end - begin);
-  });
-}
-
-bool all_finite(std::span<const glm::vec3> vectors) {
-  return vectors.empty() || lookup_kernels().all_finite_f32(&vectors[0].x, 3 * vectors.size());
-}
-
-bool all_finite(std::span<const glm::dvec3> vectors) {
-  return vectors.empty() || lookup_kernels().all_finite_f64(&vectors[0].x, 3 * vectors.size());
+  map_rays(positions, "normals", normals, lookups,
+           [&](const float* p, const float* n, float* l, std::size_t count) {
+             return lookup_kernels().mirrors_f32(k, e, p, n, l, count);
+           });
 }
 
 }  // namespace mirrorbake

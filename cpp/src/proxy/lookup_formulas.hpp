@@ -23,20 +23,34 @@ inline Vec operator*(double s, const Vec& v) { return {s * v.x, s * v.y, s * v.z
 inline double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec vec(const double* v) { return {v[0], v[1], v[2]}; }
 
-/// Ray parameter at which p + t·d crosses the wall at ±extent that d faces, ∞ if d is parallel to it.
-inline double wall_distance(double p, double d, double extent) {
-  const double t = __builtin_fabs(__builtin_copysign(extent, d) - p) / __builtin_fabs(d);
-  // 0/0, a point on the wall and a direction within it, must not win: the comparison is false for NaN.
-  return t >= 0 ? t : kInfinity;
+/// Ray parameter at which a wall is crossed, as a fraction, so that the nearest of three costs one division.
+struct Crossing {
+  double distance;  ///< along the wall's normal, at least 0
+  double speed;     ///< of the ray along it, at least 0; 0 for a ray parallel to the wall
+};
+
+/// Of the walls at ±extent, the one that d faces.
+inline Crossing crossing(double p, double d, double extent) {
+  const double distance = __builtin_fabs(__builtin_copysign(extent, d) - p);
+  const double speed = __builtin_fabs(d);
+  // A point on the wall and a direction within it, 0/0, must not win over other walls.
+  return {speed > 0 ? distance : 1, speed};
 }
 
-/// Box [−extent, extent]. Three divisions are faster than one and the comparison of fractions, vectorised or not.
+/// The earlier one. Products of fractions neither overflow nor vanish: float32 coordinates span 1e±45, and so
+/// do the float64 ones that a proxy accepts.
+inline Crossing first(const Crossing& a, const Crossing& b) {
+  const bool a_first = a.distance * b.speed < b.distance * a.speed;
+  return {a_first ? a.distance : b.distance, a_first ? a.speed : b.speed};
+}
+
+/// Box [−extent, extent].
 inline double box_exit(const Vec& p, const Vec& d, const Vec& extent) {
-  const double x = wall_distance(p.x, d.x, extent.x);
-  const double y = wall_distance(p.y, d.y, extent.y);
-  const double z = wall_distance(p.z, d.z, extent.z);
-  const double xy = x < y ? x : y;
-  const double t = xy < z ? xy : z;
+  const Crossing x = crossing(p.x, d.x, extent.x);
+  const Crossing y = crossing(p.y, d.y, extent.y);
+  const Crossing z = crossing(p.z, d.z, extent.z);
+  const Crossing nearest = first(first(x, y), z);
+  const double t = nearest.distance / nearest.speed;
   return t < kInfinity ? t : 0;
 }
 

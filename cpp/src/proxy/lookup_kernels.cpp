@@ -34,6 +34,18 @@ inline void store(const Block<T>& block, std::size_t count, T* __restrict xyz) {
   }
 }
 
+/// x·0 is 0 for finite x and NaN otherwise, which nothing added to the sum takes away again.
+template <typename T>
+inline bool all_finite(const Block<T>& a, const Block<T>& b, std::size_t count) {
+  unsigned bad = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const T sum =
+        a.x[i] * T(0) + a.y[i] * T(0) + a.z[i] * T(0) + b.x[i] * T(0) + b.y[i] * T(0) + b.z[i] * T(0);
+    bad |= sum == T(0) ? 0U : 1U;
+  }
+  return bad == 0;
+}
+
 template <typename T>
 inline Vec vec(const Block<T>& block, std::size_t i) {
   return {static_cast<double>(block.x[i]), static_cast<double>(block.y[i]), static_cast<double>(block.z[i])};
@@ -41,14 +53,15 @@ inline Vec vec(const Block<T>& block, std::size_t i) {
 
 /// lookups[i] = lookup along direction(position i, second i), block by block.
 template <LookupShape shape, bool rotated, typename T, typename Direction>
-void loop(const LookupConstants& constants, const T* positions, const T* seconds, T* lookups,
-          std::size_t count, Direction direction) {
+std::size_t loop(const LookupConstants& constants, const T* positions, const T* seconds, T* lookups,
+                 std::size_t count, Direction direction) {
   const LookupConstants k = constants;
   Block<T> p, s;
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t n = count - begin < kBlock ? count - begin : kBlock;
     load(positions + 3 * begin, n, p);
     load(seconds + 3 * begin, n, s);
+    if (!all_finite(p, s, n)) return begin;
     for (std::size_t i = 0; i < n; ++i) {
       const Vec position = vec(p, i);
       const Vec second = vec(s, i);
@@ -59,11 +72,12 @@ void loop(const LookupConstants& constants, const T* positions, const T* seconds
     }
     store(p, n, lookups + 3 * begin);
   }
+  return count;
 }
 
 template <typename T, typename Direction>
-void loop_of_shape(const LookupConstants& k, const T* positions, const T* seconds, T* lookups,
-                   std::size_t count, Direction direction) {
+std::size_t loop_of_shape(const LookupConstants& k, const T* positions, const T* seconds, T* lookups,
+                          std::size_t count, Direction direction) {
   switch (k.shape) {
     case LookupShape::infinite:
       return loop<LookupShape::infinite, false>(k, positions, seconds, lookups, count, direction);
@@ -79,33 +93,20 @@ void loop_of_shape(const LookupConstants& k, const T* positions, const T* second
                  ? loop<LookupShape::hemisphere, true>(k, positions, seconds, lookups, count, direction)
                  : loop<LookupShape::hemisphere, false>(k, positions, seconds, lookups, count, direction);
   }
+  return 0;
 }
 
 template <typename T>
-void rays(const LookupConstants& k, const T* positions, const T* directions, T* lookups, std::size_t count) {
-  loop_of_shape(k, positions, directions, lookups, count, [](const Vec&, const Vec& d) { return d; });
+std::size_t rays(const LookupConstants& k, const T* positions, const T* directions, T* lookups,
+                 std::size_t count) {
+  return loop_of_shape(k, positions, directions, lookups, count, [](const Vec&, const Vec& d) { return d; });
 }
 
-void mirrors(const LookupConstants& k, const double* eye, const float* positions, const float* normals,
-             float* lookups, std::size_t count) {
+std::size_t mirrors(const LookupConstants& k, const double* eye, const float* positions, const float* normals,
+                    float* lookups, std::size_t count) {
   const Vec e = vec(eye);
-  loop_of_shape(k, positions, normals, lookups, count,
-                [e](const Vec& p, const Vec& n) { return reflect(p, n, e); });
-}
-
-/// x·0 is 0 for finite x and NaN otherwise, which nothing added to the sum takes away again.
-template <typename T>
-bool all_finite(const T* values, std::size_t count) {
-  constexpr std::size_t kLanes = 32;  // independent sums, so that the loop is vectorised without reordering
-  T sums[kLanes] = {};
-  std::size_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    for (std::size_t lane = 0; lane < kLanes; ++lane) sums[lane] += values[i + lane] * T(0);
-  }
-  for (; i < count; ++i) sums[0] += values[i] * T(0);
-  T sum = 0;
-  for (const T lane : sums) sum += lane;
-  return sum == T(0);
+  return loop_of_shape(k, positions, normals, lookups, count,
+                       [e](const Vec& p, const Vec& n) { return reflect(p, n, e); });
 }
 
 }  // namespace
@@ -114,8 +115,6 @@ const LookupKernels kLookupKernels = {
     .rays_f32 = rays<float>,
     .rays_f64 = rays<double>,
     .mirrors_f32 = mirrors,
-    .all_finite_f32 = all_finite<float>,
-    .all_finite_f64 = all_finite<double>,
 };
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

@@ -19,16 +19,15 @@ struct LookupConstants {
   double origin[3] = {};
 };
 
-/// Arrays of xyz triples; `lookups` may be the same memory as an input.
+/// Arrays of xyz triples; `lookups` may be the same memory as an input. They go through the rays in blocks, stop
+/// before the first block that holds a NaN or an infinite value, and return how many rays they are done with.
 struct LookupKernels {
-  void (*rays_f32)(const LookupConstants& k, const float* positions, const float* directions, float* lookups,
-                   std::size_t count);
-  void (*rays_f64)(const LookupConstants& k, const double* positions, const double* directions,
-                   double* lookups, std::size_t count);
-  void (*mirrors_f32)(const LookupConstants& k, const double* eye, const float* positions,
-                      const float* normals, float* lookups, std::size_t count);
-  bool (*all_finite_f32)(const float* values, std::size_t count);
-  bool (*all_finite_f64)(const double* values, std::size_t count);
+  std::size_t (*rays_f32)(const LookupConstants& k, const float* positions, const float* directions,
+                          float* lookups, std::size_t count);
+  std::size_t (*rays_f64)(const LookupConstants& k, const double* positions, const double* directions,
+                          double* lookups, std::size_t count);
+  std::size_t (*mirrors_f32)(const LookupConstants& k, const double* eye, const float* positions,
+                             const float* normals, float* lookups, std::size_t count);
 };
 
 /// The loops for active_isa().

@@ -7,10 +7,14 @@
 
 namespace mirrorbake::detail {
 
-inline bool is_finite(glm::vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+template <typename Real>
+bool is_finite(const glm::vec<3, Real>& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 /// "(1, 2, 3)", for error messages.
-inline std::string vec_text(glm::vec3 v) {
+template <typename Real>
+std::string vec_text(const glm::vec<3, Real>& v) {
   char text[96];
   std::snprintf(text, sizeof text, "(%g, %g, %g)", static_cast<double>(v.x), static_cast<double>(v.y),
                 static_cast<double>(v.z));

@@ -11,8 +11,8 @@
 /// What the functions of arrays share: checks, and chunks on several threads.
 namespace mirrorbake {
 
-// Elements per task: some ten microseconds of work, against about one to hand it out.
-constexpr std::size_t kFresnelGrain = std::size_t{1} << 15;
+// Elements per task: twenty microseconds of work and more, against about one to hand it out.
+constexpr std::size_t kFresnelGrain = std::size_t{1} << 16;
 
 template <typename T>
 void check_input(std::string_view name, std::span<const T> input, std::span<T> f) {

@@ -197,14 +197,21 @@ inline float conductor_series(float c, const float* a_coefficients, const float*
   return conductor_from(m + c2, 2.0F * a * c, m * c2 + q * q, q);
 }
 
+/// Two neighbours of a table in one load: vectorised, half the gathered elements.
+using FloatPair [[gnu::aligned(4), gnu::may_alias]] = unsigned long long;
+
 /// F4: linear interpolation between last + 1 values at equal distances in c, the first at 0, the last at 1.
 template <typename T>
 inline T interpolate(T c, const float* values, int last) {
   const T x = (c == c ? c : T(0)) * static_cast<T>(last);  // a NaN reads entry 0, and is put back below
   int i = static_cast<int>(x);
   i = i < last - 1 ? i : last - 1;
-  const T low = static_cast<T>(values[i]);
-  const T high = static_cast<T>(values[i + 1]);
+  const unsigned long long pair = *reinterpret_cast<const FloatPair*>(values + i);
+  const auto lower = __builtin_bit_cast(float, static_cast<unsigned>(pair));
+  const auto upper = __builtin_bit_cast(float, static_cast<unsigned>(pair >> 32));
+  constexpr bool little_endian = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
+  const T low = static_cast<T>(little_endian ? lower : upper);
+  const T high = static_cast<T>(little_endian ? upper : lower);
   const T f = low + (x - static_cast<T>(i)) * (high - low);
   return c == c ? f : c;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -344,24 +345,48 @@ TEST(Lookup, BatchRejectsSpansOfDifferentLength) {
   EXPECT_THROW(lookup_directions(Proxy{Box{}, {}}, three, three, two), InvalidArgument);
 }
 
-TEST(Lookup, AllFiniteFindsASingleBadNumberAnywhere) {
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const InvalidArgument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Lookup, BatchNamesTheFirstRowThatIsNotFiniteInAnyArrayAndPrecision) {
+  const Proxy box{Box{}, {}};
   const float inf = std::numeric_limits<float>::infinity();
-  for (std::size_t count : {0U, 1U, 11U, 40U}) {
-    std::vector<glm::vec3> v(count, glm::vec3(std::numeric_limits<float>::max()));
-    std::vector<glm::dvec3> w(count, glm::dvec3(std::numeric_limits<double>::lowest()));
-    EXPECT_TRUE(all_finite(v));
-    EXPECT_TRUE(all_finite(w));
-    for (std::size_t i = 0; i < 3 * count; ++i) {
-      for (float bad : {inf, -inf, std::numeric_limits<float>::quiet_NaN()}) {
-        v[i / 3][static_cast<int>(i % 3)] = bad;
-        w[i / 3][static_cast<int>(i % 3)] = static_cast<double>(bad);
-        EXPECT_FALSE(all_finite(v));
-        EXPECT_FALSE(all_finite(w));
-        v[i / 3][static_cast<int>(i % 3)] = 1;
-        w[i / 3][static_cast<int>(i % 3)] = 1;
+  const glm::vec3 largest(std::numeric_limits<float>::max(), -std::numeric_limits<float>::max(), 1);
+  for (const Isa isa : {Isa::baseline, Isa::sse42, Isa::avx2, Isa::avx512}) {
+    const IsaLimit limit(isa);
+    for (std::size_t count : {1U, 11U, 128U, 40000U}) {
+      std::vector<glm::vec3> finite(count, largest), lookups(count);
+      EXPECT_NO_THROW(lookup_directions(box, finite, finite, lookups));
+      for (std::size_t row : {std::size_t{0}, count / 2, count - 1}) {
+        for (float bad : {inf, -inf, std::numeric_limits<float>::quiet_NaN()}) {
+          std::vector<glm::vec3> broken = finite;
+          broken[row][static_cast<int>(row % 3)] = bad;
+          broken[count - 1].y = bad;
+          const std::vector<glm::dvec3> wide(broken.begin(), broken.end());
+          const std::vector<glm::dvec3> wide_finite(finite.begin(), finite.end());
+          std::vector<glm::dvec3> wide_lookups(count);
+          const auto in_row = testing::HasSubstr(" in row " + std::to_string(row) + ",");
+          using testing::AllOf;
+          using testing::StartsWith;
+          EXPECT_THAT(message_of([&] { lookup_directions(box, broken, finite, lookups); }),
+                      AllOf(StartsWith("positions"), in_row));
+          EXPECT_THAT(message_of([&] { lookup_directions(box, wide_finite, wide, wide_lookups); }),
+                      AllOf(StartsWith("directions"), in_row));
+          EXPECT_THAT(message_of([&] {
+                        mirror_lookups(box, {0, 0, 0}, finite, broken, broken);
+                      }),
+                      AllOf(StartsWith("normals"), in_row));
+        }
       }
     }
   }
+  EXPECT_THAT(message_of([&] { mirror_lookups(box, {inf, 0, 0}, {}, {}, {}); }), testing::StartsWith("eye"));
 }
 
 TEST(Lookup, MirrorsRejectSpansOfDifferentLength) {

@@ -69,9 +69,9 @@ glm::vec3 lookup_direction(const Proxy& proxy, glm::vec3 position, glm::vec3 dir
 /// The same with float64 coordinates.
 glm::dvec3 lookup_direction(const Proxy& proxy, glm::dvec3 position, glm::dvec3 direction);
 
-/// The same for many rays, in parallel and vectorised, with the same bits as one at a time. The three spans have
-/// one length (else InvalidArgument); `lookups` may be the same memory as `positions` or `directions`, but
-/// not overlap partly.
+/// The same for many rays, in parallel and vectorised, with the same bits as one at a time. `lookups` may be the same
+/// memory as `positions` or `directions`, but not overlap partly. Throws InvalidArgument if the spans differ in
+/// length, or naming the first row with a NaN or infinite component; `lookups` is then unspecified.
 void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
                        std::span<const glm::vec3> directions, std::span<glm::vec3> lookups);
 
@@ -80,14 +80,10 @@ void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions
                        std::span<const glm::dvec3> directions, std::span<glm::dvec3> lookups);
 
 /// Texture coordinates of a mirror's vertices or pixels ([PEM] §4): lookups along the reflections, about the `normals`
-/// (any length > 0), of rays from `eye` to the `positions`. The spans have one length (else InvalidArgument);
-/// `lookups` may be the memory of an input.
+/// (any length > 0), of rays from `eye` to the `positions`. Memory and errors as for lookup_directions; `eye` has to be
+/// finite too.
 void mirror_lookups(const Proxy& proxy, glm::vec3 eye, std::span<const glm::vec3> positions,
                     std::span<const glm::vec3> normals, std::span<glm::vec3> lookups);
-
-/// True if no component is NaN or infinite: what callers ask of rays that come from outside. A tenth of a lookup's time.
-bool all_finite(std::span<const glm::vec3> vectors);
-bool all_finite(std::span<const glm::dvec3> vectors);
 
 /// Throws InvalidArgument, naming the field, if the proxy is not usable: extents not positive or not finite,
 /// axes not orthonormal (to 1e-4), origin not inside of the shape.

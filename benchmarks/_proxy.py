@@ -9,10 +9,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize import minimize
+from scipy.spatial import ConvexHull
 
 from benchmarks._report import Case, require, seconds
 from mirrorbake import _core
-from mirrorbake.proxy import Proxy
+from mirrorbake.proxy import Proxy, fit_ellipsoid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,6 +55,47 @@ def numpy_hemisphere(proxy: Proxy, p: Any, d: Any) -> Any:
 def angles(a: Any, b: Any) -> Any:
     a, b = a.astype(np.float64), b.astype(np.float64)
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.sum(a * b, axis=1))
+
+
+def slsqp_radii(points: Any, centre: Any) -> Any:
+    """Radii of the minimum-volume ellipsoid by a general solver: max log det W, W x² <= 1, W diagonal."""
+    squares = (points.astype(np.float64) - np.asarray(centre, np.float64)) ** 2
+    unit = squares.max(axis=0)
+    x = squares / unit
+    solution = minimize(
+        lambda w: -np.sum(np.log(w)),
+        np.full(3, 0.3),
+        jac=lambda w: -1 / w,
+        method="SLSQP",
+        bounds=[(1e-3, 2)] * 3,
+        constraints={"type": "ineq", "fun": lambda w: 1 - x @ w, "jac": lambda w: -x},
+        options={"ftol": 1e-12, "maxiter": 200},
+    )
+    return np.sqrt(unit / solution.x * np.max(x @ solution.x))
+
+
+def ellipsoid_fit() -> Case:
+    rng = np.random.default_rng(2)
+    points = (rng.standard_normal((COUNT, 3)) * (1.0, 0.4, 0.7)).astype(np.float32)
+    # SciPy's solver takes a matrix of all constraints; only vertices of the convex hull can touch.
+    hull = points[ConvexHull(points).vertices]
+    centre = (0.05, -0.02, 0.1)
+    radii, peer = np.array(fit_ellipsoid(points, centre).radii), slsqp_radii(hull, centre)
+    excess = float(np.prod(radii) / np.prod(peer) - 1)
+    require(abs(excess) < 1e-4, f"volumes of the ellipsoids differ by {excess}")
+
+    def theirs() -> None:
+        slsqp_radii(points[ConvexHull(points).vertices], centre)
+
+    return Case(
+        f"minimum-volume ellipsoid of {COUNT:,} vertices",
+        "ms",
+        1e3 * seconds(lambda: fit_ellipsoid(points, centre), 20),
+        1e3 * seconds(theirs, 5),
+        "SciPy Qhull + SLSQP",
+        excess,
+        0.0,
+    )
 
 
 def cases() -> Iterator[Case]:
@@ -110,3 +153,4 @@ def cases() -> Iterator[Case]:
             0.0,
         )
         del limit
+    yield ellipsoid_fit()

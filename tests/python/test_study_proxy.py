@@ -14,8 +14,9 @@ def test_lookups_are_within_float_rounding_of_50_digits(tmp_path: Path) -> None:
     assert max(float32) < 1e-7
     # In float64 the ellipsoid's roots lose digits next to the wall: 1e-16 / √1e-6 and the aspect ratio.
     float64 = [e.largest for e in errors if e.arithmetic == "mirrorbake float64"]
-    assert len(float64) == 36
+    assert len(float64) == 42  # 2 shapes × 2 × 3 aspects × 3 depths, and 2 × 3 of the hemisphere
     assert max(float64) < 1e-11
+    assert {e.shape for e in errors} >= {"box", "ellipsoid", "hemisphere", "rotated hemisphere"}
     assert json.loads(json.dumps(as_json(errors)))["errors"][0]["shape"] == "box"
     plot(errors, tmp_path / "proxy.png")
     assert (tmp_path / "proxy.png").stat().st_size > 10_000

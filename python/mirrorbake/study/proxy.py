@@ -38,20 +38,29 @@ class ProxyError:
     mean: float
 
 
+def _extent(proxy: Proxy) -> NDArray[Any]:
+    if proxy.kind == "hemisphere":
+        return np.full(3, proxy.radius)
+    return np.array(proxy.half_extent if proxy.kind == "box" else proxy.radii)
+
+
 def _rays_near_the_wall(
     rng: np.random.Generator, proxy: Proxy, depth: float, count: int, dtype: type
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Positions at `depth` from the wall, and directions; none that rounding brings too close to it."""
-    box = proxy.kind == "box"
     axes = proxy.axes.astype(np.float64)
-    centre, extent = np.array(proxy.centre), np.array(proxy.half_extent if box else proxy.radii)
-    norm = np.inf if box else 2
+    centre, extent = np.array(proxy.centre), _extent(proxy)
+    norm = np.inf if proxy.kind == "box" else 2
     local = rng.normal(size=(count, 3))
     local *= (1 - depth) / np.linalg.norm(local, ord=norm, axis=1, keepdims=True)
+    if proxy.kind == "hemisphere":  # half of them near the dome, half near the floor
+        local[:, 1] = np.where(np.arange(count) % 2, np.maximum(np.abs(local[:, 1]), depth), depth)
     positions: NDArray[Any] = (centre + (local * extent) @ axes).astype(dtype)
     directions: NDArray[Any] = rng.normal(size=(count, 3)).astype(dtype)
     back = ((positions.astype(np.float64) - centre) @ axes.T) / extent
     inside = np.linalg.norm(back, ord=norm, axis=1) < 1 - 0.5 * depth
+    if proxy.kind == "hemisphere":
+        inside &= back[:, 1] > 0.5 * depth
     return positions[inside], directions[inside]
 
 
@@ -68,10 +77,12 @@ def _numpy_lookup(proxy: Proxy, p: NDArray[Any], d: NDArray[Any]) -> NDArray[Any
         if proxy.kind == "box":
             t = np.min((np.copysign(np.array(proxy.half_extent, dtype), e) - q) / e, axis=1)
         else:
-            radii: NDArray[Any] = np.array(proxy.radii, dtype)
+            radii: NDArray[Any] = _extent(proxy).astype(dtype)
             q, e = q / radii, e / radii
             a, b, c = np.sum(e * e, 1), np.sum(q * e, 1), np.sum(q * q, 1) - dtype(1)
             t = (-b + np.sqrt(b * b - a * c)) / a
+            if proxy.kind == "hemisphere":
+                t = np.where(e[:, 1] < 0, np.minimum(t, -q[:, 1] / e[:, 1]), t)
     lookup: NDArray[Any] = p + t[:, None] * d - np.array(proxy.origin, dtype)
     return lookup
 
@@ -93,7 +104,7 @@ def _exact_errors(
 
         axes = [exact(row) for row in proxy.axes]
         centre, origin = exact(proxy.centre), exact(proxy.origin)
-        extent = exact(proxy.half_extent if proxy.kind == "box" else proxy.radii)
+        extent = exact(_extent(proxy))
         for i in range(len(p)):
             position, direction = exact(p[i]), exact(d[i])
             offset = [x - c for x, c in zip(position, centre, strict=True)]
@@ -104,6 +115,8 @@ def _exact_errors(
             else:
                 a, b, c = dot(e, e), dot(q, e), dot(q, q) - 1
                 t = (-b + mp.sqrt(b * b - a * c)) / a
+                if proxy.kind == "hemisphere" and e[1] < 0:
+                    t = min(t, -q[1] / e[1])
             true = [x + t * v - o for x, v, o in zip(position, direction, origin, strict=True)]
             for name, lookup in lookups.items():
                 got = exact(lookup[i])
@@ -137,14 +150,19 @@ def proxy_errors(samples: int = 50, seed: int = 1, depths: tuple[float, ...] = D
     """
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0].astype(np.float32)
-    shapes: dict[str, Callable[..., Proxy]] = {"box": Proxy.box, "ellipsoid": Proxy.ellipsoid}
+    shapes: dict[str, Callable[..., Proxy]] = {
+        "box": Proxy.box,
+        "ellipsoid": Proxy.ellipsoid,
+        "hemisphere": lambda centre, extent, origin, axes: Proxy.hemisphere(centre, extent[0], origin, axes),
+    }
     result = []
     for kind, make in shapes.items():
         for rotated in (False, True):
-            for aspect in (1.0, 1e2, 1e4):
+            for aspect in (1.0,) if kind == "hemisphere" else (1.0, 1e2, 1e4):
                 extent, centre = np.array([3.0, 3.0 / aspect, 2.0]), np.array([1.0, -2.0, 0.5])
                 axes = turn if rotated else np.eye(3, dtype=np.float32)
-                origin = centre + (0.3 * extent * (1.0, -0.5, 0.7)) @ axes
+                lift = 0.5 if kind == "hemisphere" else -0.5
+                origin = centre + (0.3 * extent * (1.0, lift, 0.7)) @ axes
                 proxy = make(tuple(centre), tuple(extent), tuple(origin), axes)
                 for depth in depths:
                     for dtype in (np.float32, np.float64):

@@ -21,17 +21,14 @@ std::uint32_t laine_karras_permutation(std::uint32_t x, std::uint32_t seed) {
   return x;
 }
 
-std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
-  return reverse_bits(laine_karras_permutation(reverse_bits(x), seed));
-}
-
-// The second Sobol dimension: generator matrix of Pascal's triangle mod 2, column by column.
-std::uint32_t sobol_second_dimension(std::uint32_t index) {
-  std::uint32_t result = 0;
-  for (std::uint32_t column = 0x80000000u; index != 0; index >>= 1, column ^= column >> 1) {
-    if (index & 1u) result ^= column;
-  }
-  return result;
+// The second Sobol dimension of an index, its bits reversed. The generator matrix is Pascal's triangle mod 2, the
+// Kronecker power of ((1, 1), (0, 1)), and so takes one step per factor.
+std::uint32_t reversed_sobol_second_dimension(std::uint32_t index) {
+  index ^= index >> 16;
+  index ^= (index & 0xff00ff00u) >> 8;
+  index ^= (index & 0xf0f0f0f0u) >> 4;
+  index ^= (index & 0xccccccccu) >> 2;
+  return index ^ ((index & 0xaaaaaaaau) >> 1);
 }
 
 }  // namespace
@@ -39,10 +36,14 @@ std::uint32_t sobol_second_dimension(std::uint32_t index) {
 glm::vec2 sobol_2d(std::uint32_t index, std::uint64_t sequence) {
   const std::uint64_t seeds = hash64(sequence);
   const std::uint64_t more_seeds = hash64(seeds);
-  const std::uint32_t shuffled = owen_scramble(index, static_cast<std::uint32_t>(seeds));
-  const std::uint32_t x = owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(seeds >> 32));
-  const std::uint32_t y =
-      owen_scramble(sobol_second_dimension(shuffled), static_cast<std::uint32_t>(more_seeds));
+  // An Owen scramble is the permutation between two reversals. Those that cancel are left out: of the first Sobol
+  // dimension, which is the index reversed, and of the second.
+  const std::uint32_t shuffled =
+      reverse_bits(laine_karras_permutation(reverse_bits(index), static_cast<std::uint32_t>(seeds)));
+  const std::uint32_t x =
+      reverse_bits(laine_karras_permutation(shuffled, static_cast<std::uint32_t>(seeds >> 32)));
+  const std::uint32_t y = reverse_bits(laine_karras_permutation(reversed_sobol_second_dimension(shuffled),
+                                                                static_cast<std::uint32_t>(more_seeds)));
   return {unit_float(x), unit_float(y)};
 }
 

@@ -123,14 +123,18 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
     // One lobe at random, in proportion to what the lobes reflect.
     const std::uint32_t dimension =
         dimension_base(bounce, std::min(vertex, static_cast<int>(vertices_per_bounce) - 1));
-    const glm::vec2 choice = stream.get(dimension + lobe_dimension);
+    // Stratification pays off where many samples share the vertices before: on the first two of a path.
+    const auto random = [&](std::uint32_t use) {
+      return vertex <= 2 ? stream.get(dimension + use) : stream.get_independent(dimension + use);
+    };
+    const glm::vec2 choice = random(lobe_dimension);
     const float diffuse_share = luminance(surface.albedo);
     const float mirror_share = specular_bounces <= limits.specular_depth ? luminance(surface.fresnel) : 0.0F;
     const bool has_diffuse = surface.albedo != glm::vec3(0.0F);
     const bool continue_diffuse = diffuse_bounces < limits.diffuse_depth;
     if (has_diffuse) {
       sum += throughput * surface.albedo * kInversePi *
-             direct_irradiance(world, surface, stream.get(dimension + light_dimension), continue_diffuse);
+             direct_irradiance(world, surface, random(light_dimension), continue_diffuse);
     }
     const float total = (continue_diffuse ? diffuse_share : 0.0F) + mirror_share;
     if (!(total > 0.0F)) return sum;
@@ -142,7 +146,7 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
       last_was_mirror = true;
     } else {
       throughput *= surface.albedo / (1.0F - mirror_probability);
-      direction = sample_cosine_hemisphere(Frame(surface.normal), stream.get(dimension + diffuse_dimension));
+      direction = sample_cosine_hemisphere(Frame(surface.normal), random(diffuse_dimension));
       pdf = glm::dot(surface.normal, direction) * kInversePi;
       ++diffuse_bounces;
       last_was_mirror = false;

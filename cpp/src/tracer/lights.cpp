@@ -48,13 +48,11 @@ struct SphericalRectangle {
   double b0, b1, k;
   double solid_angle;
 
-  SphericalRectangle(glm::vec3 corner, glm::vec3 edge_u, glm::vec3 edge_v, glm::vec3 position) {
-    const double width = glm::length(glm::dvec3(edge_u));
-    const double height = glm::length(glm::dvec3(edge_v));
-    x = glm::dvec3(edge_u) / width;
-    y = glm::dvec3(edge_v) / height;
+  /// Unit edges, their lengths, and the way from the point to the corner.
+  SphericalRectangle(const glm::dvec3& unit_u, const glm::dvec3& unit_v, double width, double height,
+                     const glm::dvec3& d)
+      : x(unit_u), y(unit_v) {
     z = glm::cross(x, y);
-    const glm::dvec3 d = glm::dvec3(corner) - glm::dvec3(position);
     z0 = glm::dot(d, z);
     if (z0 > 0.0) {
       z = -z;
@@ -218,6 +216,10 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
     r.orthogonal =
         std::abs(glm::dot(r.edge_u, r.edge_v)) <= 1e-5F * glm::length(r.edge_u) * glm::length(r.edge_v);
     r.radiance = light.radiance;
+    r.width = glm::length(glm::dvec3(light.edge_u));
+    r.height = glm::length(glm::dvec3(light.edge_v));
+    r.unit_u = glm::dvec3(light.edge_u) / r.width;
+    r.unit_v = glm::dvec3(light.edge_v) / r.height;
     rectangles_.push_back(r);
     add(Kind::rectangle, static_cast<int>(i), static_cast<double>(luminance(light.radiance) * r.area * kPi));
   }
@@ -336,7 +338,7 @@ std::optional<LightSample> Lights::sample_rectangle(const Rectangle& r, glm::vec
   glm::vec3 to;
   float pdf = 0.0F;
   if (by_solid_angle(r.centre, r.diagonal, r.orthogonal, position)) {
-    const SphericalRectangle seen(r.corner, r.edge_u, r.edge_v, position);
+    const SphericalRectangle seen(r.unit_u, r.unit_v, r.width, r.height, glm::dvec3(r.corner) - glm::dvec3(position));
     if (!(seen.solid_angle > 0.0)) return std::nullopt;
     to = glm::vec3(seen.sample(u));
     pdf = static_cast<float>(1.0 / seen.solid_angle);
@@ -371,7 +373,7 @@ float Lights::rectangle_pdf(int light, glm::vec3 position, glm::vec3 direction, 
   const Rectangle& r = rectangles_[static_cast<std::size_t>(light)];
   const float probability = rectangle_probability_[static_cast<std::size_t>(light)];
   if (by_solid_angle(r.centre, r.diagonal, r.orthogonal, position)) {
-    const double solid_angle = SphericalRectangle(r.corner, r.edge_u, r.edge_v, position).solid_angle;
+    const double solid_angle = SphericalRectangle(r.unit_u, r.unit_v, r.width, r.height, glm::dvec3(r.corner) - glm::dvec3(position)).solid_angle;
     return solid_angle > 0.0 ? probability * static_cast<float>(1.0 / solid_angle) : 0.0F;
   }
   const float cosine = -glm::dot(direction, r.normal);

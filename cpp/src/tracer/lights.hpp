@@ -78,6 +78,8 @@ class Lights {
     glm::vec3 corner, edge_u, edge_v, normal, centre, radiance;
     float area, diagonal;
     bool orthogonal;
+    glm::dvec3 unit_u, unit_v;  ///< the edges' directions
+    double width, height;
   };
   struct Mesh {
     std::vector<float> area_cdf;  ///< triangles + 1, in [0,1]

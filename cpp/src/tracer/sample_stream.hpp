@@ -18,6 +18,11 @@ struct SampleStream {
   std::uint32_t index = 0;  ///< number of the sample in its pixel
 
   glm::vec2 get(std::uint32_t dimension) const { return sobol_2d(index, hash64(key ^ dimension)); }
+  /// The same without stratification, four times as fast.
+  glm::vec2 get_independent(std::uint32_t dimension) const {
+    const std::uint64_t bits = hash64(key ^ dimension, index);
+    return {unit_float(static_cast<std::uint32_t>(bits >> 32)), unit_float(static_cast<std::uint32_t>(bits))};
+  }
 };
 
 inline SampleStream sample_stream(std::uint64_t seed, std::uint64_t pixel, std::uint32_t index) {

@@ -1,3 +1,4 @@
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -133,19 +134,49 @@ void bind_tracer(nb::module_& m) {
       .def(
           "__init__",
           [](TraceOptions* self, int samples_per_pixel, int max_specular_depth, int max_diffuse_depth,
-             std::uint64_t seed) {
-            new (self) TraceOptions{samples_per_pixel, max_specular_depth, max_diffuse_depth, seed};
+             std::uint64_t seed, std::array<int, 4> window) {
+            new (self) TraceOptions{samples_per_pixel,
+                                    max_specular_depth,
+                                    max_diffuse_depth,
+                                    seed,
+                                    {window[0], window[1], window[2], window[3]},
+                                    {}};
           },
           nb::kw_only(), nb::arg("samples_per_pixel") = TraceOptions{}.samples_per_pixel,
           nb::arg("max_specular_depth") = TraceOptions{}.max_specular_depth,
           nb::arg("max_diffuse_depth") = TraceOptions{}.max_diffuse_depth,
-          nb::arg("seed") = TraceOptions{}.seed)
+          nb::arg("seed") = TraceOptions{}.seed, nb::arg("window") = std::array<int, 4>{0, 0, 0, 0})
       .def_rw("samples_per_pixel", &TraceOptions::samples_per_pixel, "1 to 65536.")
       .def_rw("max_specular_depth", &TraceOptions::max_specular_depth,
-              "Mirror bounces after the first, 0 to 64.")
+              "Specular bounces after the first, 0 to 64.")
       .def_rw("max_diffuse_depth", &TraceOptions::max_diffuse_depth,
               "Diffuse bounces of IndirectLight.path, 0 to 64.")
-      .def_rw("seed", &TraceOptions::seed);
+      .def_rw("seed", &TraceOptions::seed)
+      .def_prop_rw(
+          "window",
+          [](const TraceOptions& o) {
+            return std::array<int, 4>{o.window.x, o.window.y, o.window.width, o.window.height};
+          },
+          [](TraceOptions& o, std::array<int, 4> w) {
+            o.window = {w[0], w[1], w[2], w[3]};
+          },
+          "x, y, width, height of the part of the image to trace, in pixels; of no size: everything.");
+
+  nb::class_<BeautyTrace>(m, "BeautyTrace", "An image that was traced until its noise was below a limit.")
+      .def_prop_ro(
+          "image",
+          [](nb::handle self) {
+            const Image& image = nb::cast<const BeautyTrace&>(self).image;
+            const std::size_t shape[3] = {static_cast<std::size_t>(image.height),
+                                          static_cast<std::size_t>(image.width), image.channels.size()};
+            return nb::ndarray<nb::numpy, const float>(image.pixels.data(), 3, shape, self);
+          },
+          "(height, width, 3) float32 radiance, read-only.")
+      .def_ro("noise", &BeautyTrace::noise,
+              "Relative standard error of a pixel's luminance, root mean square over the tiles.")
+      .def_ro("mean_samples_per_pixel", &BeautyTrace::mean_samples_per_pixel)
+      .def_ro("share_above", &BeautyTrace::share_above,
+              "Share of the tiles that samples_per_pixel ended before they reached the limit.");
 
   bind_samples(m);
 
@@ -199,11 +230,31 @@ void bind_tracer(nb::module_& m) {
           nb::sig("def trace_beauty(self, camera: Camera, options: TraceOptions = ...) -> "
                   "NDArray[numpy.float32]"),
           "Image of everything: (height, width, 3) float32 radiance.")
-      .def("trace_layers", &Tracer::trace_layers, nb::arg("camera"), nb::arg("reflector"),
-           nb::arg("options") = TraceOptions{}, nb::call_guard<nb::gil_scoped_release>(),
+      .def(
+          "trace_beauty_to_noise", &Tracer::trace_beauty_to_noise, nb::arg("camera"), nb::arg("noise"),
+          nb::arg("options") = TraceOptions{}, nb::call_guard<nb::gil_scoped_release>(),
+          nb::sig(
+              "def trace_beauty_to_noise(self, camera: Camera, noise: float, options: TraceOptions = ...) -> "
+              "BeautyTrace"),
+          "The same with as many samples as each tile of 16² pixels needs for a relative standard error of "
+          "`noise`, at\nmost options.samples_per_pixel.")
+      .def("trace_layers",
+           nb::overload_cast<const Camera&, int, const TraceOptions&>(&Tracer::trace_layers, nb::const_),
+           nb::arg("camera"), nb::arg("reflector"), nb::arg("options") = TraceOptions{},
+           nb::call_guard<nb::gil_scoped_release>(),
            nb::sig("def trace_layers(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> "
                    "LayerTrace"),
            "Layers of object number `reflector`, whose material must be specular.")
+      .def(
+          "trace_layers_of",
+          [](const Tracer& tracer, const Camera& camera, const std::vector<int>& reflectors,
+             const TraceOptions& options) { return tracer.trace_layers(camera, reflectors, options); },
+          nb::arg("camera"), nb::arg("reflectors"), nb::arg("options") = TraceOptions{},
+          nb::call_guard<nb::gil_scoped_release>(),
+          nb::sig("def trace_layers_of(self, camera: Camera, reflectors: collections.abc.Sequence[int], "
+                  "options: TraceOptions = ...) -> list[LayerTrace]"),
+          "Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as "
+          "trace_layers gives.")
       .def("trace_visibility", &Tracer::trace_visibility, nb::arg("camera"), nb::arg("reflector"),
            nb::arg("options") = TraceOptions{}, nb::call_guard<nb::gil_scoped_release>(),
            nb::sig(
@@ -257,8 +308,27 @@ void bind_tracer(nb::module_& m) {
                   "NDArray[numpy.int32], NDArray[numpy.float32]]"),
           "First hits of rays, arrays of shape (n, 3), through the objects in `hidden`. Returns the distance "
           "in metres\n"
-          "(n,), inf for a miss; the object (n,), -1 for a miss or a rectangle light; the geometric normal "
+          "(n,), inf for a miss; the object (n,), -1 for a miss or a light; the geometric normal "
           "(n, 3).")
+      .def(
+          "intersect_distance",
+          [](const Tracer& tracer, PointArray origins, PointArray directions,
+             const std::vector<int>& hidden) {
+            const std::size_t count = origins.shape(0);
+            std::vector<float> distance(count);
+            std::vector<std::int32_t> object(count);
+            {
+              nb::gil_scoped_release released;
+              tracer.intersect(points(origins), points(directions), hidden, distance, object);
+            }
+            return nb::make_tuple(to_numpy(std::move(distance), {count}),
+                                  to_numpy(std::move(object), {count}));
+          },
+          nb::arg("origins"), nb::arg("directions"), nb::arg("hidden") = std::vector<int>{},
+          nb::sig("def intersect_distance(self, origins: NDArray[numpy.float32], directions: "
+                  "NDArray[numpy.float32], hidden: collections.abc.Sequence[int] = ...) -> "
+                  "tuple[NDArray[numpy.float32], NDArray[numpy.int32]]"),
+          "Distance and object of `intersect` alone, which is faster.")
       .def(
           "vertex_irradiance",
           [](const Tracer& tracer, int object, int rays, std::uint64_t seed) {

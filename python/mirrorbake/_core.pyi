@@ -781,7 +781,7 @@ class TracerOptions:
 class TraceOptions:
     """What is decided per image."""
 
-    def __init__(self, *, samples_per_pixel: int = 16, max_specular_depth: int = 8, max_diffuse_depth: int = 4, seed: int = 0) -> None: ...
+    def __init__(self, *, samples_per_pixel: int = 16, max_specular_depth: int = 8, max_diffuse_depth: int = 4, seed: int = 0, window: Sequence[int] = [0, 0, 0, 0]) -> None: ...
 
     @property
     def samples_per_pixel(self) -> int:
@@ -792,7 +792,7 @@ class TraceOptions:
 
     @property
     def max_specular_depth(self) -> int:
-        """Mirror bounces after the first, 0 to 64."""
+        """Specular bounces after the first, 0 to 64."""
 
     @max_specular_depth.setter
     def max_specular_depth(self, arg: int, /) -> None: ...
@@ -809,6 +809,37 @@ class TraceOptions:
 
     @seed.setter
     def seed(self, arg: int, /) -> None: ...
+
+    @property
+    def window(self) -> list[int]:
+        """
+        x, y, width, height of the part of the image to trace, in pixels; of no size: everything.
+        """
+
+    @window.setter
+    def window(self, arg: Sequence[int], /) -> None: ...
+
+class BeautyTrace:
+    """An image that was traced until its noise was below a limit."""
+
+    @property
+    def image(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(height, width, 3) float32 radiance, read-only."""
+
+    @property
+    def noise(self) -> float:
+        """
+        Relative standard error of a pixel's luminance, root mean square over the tiles.
+        """
+
+    @property
+    def mean_samples_per_pixel(self) -> float: ...
+
+    @property
+    def share_above(self) -> float:
+        """
+        Share of the tiles that samples_per_pixel ended before they reached the limit.
+        """
 
 class SurfaceSamples:
     """
@@ -940,8 +971,19 @@ class Tracer:
     def trace_beauty(self, camera: Camera, options: TraceOptions = ...) -> NDArray[numpy.float32]:
         """Image of everything: (height, width, 3) float32 radiance."""
 
+    def trace_beauty_to_noise(self, camera: Camera, noise: float, options: TraceOptions = ...) -> BeautyTrace:
+        """
+        The same with as many samples as each tile of 16² pixels needs for a relative standard error of `noise`, at
+        most options.samples_per_pixel.
+        """
+
     def trace_layers(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> LayerTrace:
         """Layers of object number `reflector`, whose material must be specular."""
+
+    def trace_layers_of(self, camera: Camera, reflectors: Sequence[int], options: TraceOptions = ...) -> list[LayerTrace]:
+        """
+        Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as trace_layers gives.
+        """
 
     def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> SurfaceSamples:
         """
@@ -957,8 +999,11 @@ class Tracer:
     def intersect(self, origins: NDArray[numpy.float32], directions: NDArray[numpy.float32], hidden: Sequence[int] = ...) -> tuple[NDArray[numpy.float32], NDArray[numpy.int32], NDArray[numpy.float32]]:
         """
         First hits of rays, arrays of shape (n, 3), through the objects in `hidden`. Returns the distance in metres
-        (n,), inf for a miss; the object (n,), -1 for a miss or a rectangle light; the geometric normal (n, 3).
+        (n,), inf for a miss; the object (n,), -1 for a miss or a light; the geometric normal (n, 3).
         """
+
+    def intersect_distance(self, origins: NDArray[numpy.float32], directions: NDArray[numpy.float32], hidden: Sequence[int] = ...) -> tuple[NDArray[numpy.float32], NDArray[numpy.int32]]:
+        """Distance and object of `intersect` alone, which is faster."""
 
     def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...) -> NDArray[numpy.float32]:
         """

@@ -46,16 +46,16 @@ struct Gathered {
   bool dark_back_side = false;  ///< it hit the inside of a body, and no light was there
 };
 
-/// Follows mirrors a few bounces. `irradiance_at(surface, u)` is the irradiance of a surface, u two random
+/// Follows specular reflection a few bounces. `irradiance_at(surface, u)` is the irradiance of a surface, u two random
 /// numbers.
 template <typename IrradianceAt>
 Gathered gather_along(const World& world, Ray ray, const SampleStream& stream,
                       const IrradianceAt& irradiance_at) {
-  constexpr int kMirrorBounces = 4;
+  constexpr int kSpecularBounces = 4;
   Gathered result;
   glm::vec3 throughput(1.0F);
   for (int bounce = 0;; ++bounce) {
-    const Hit hit = world.rays.all().intersect(ray);
+    const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
     if (hit.missed() || world.is_light(hit)) {
       result.nothing = bounce == 0 && hit.missed();
       return result;
@@ -67,9 +67,11 @@ Gathered gather_along(const World& world, Ray ray, const SampleStream& stream,
           throughput * surface.albedo * std::numbers::inv_pi_v<float> * irradiance_at(surface, u);
     }
     if (bounce == 0) result.dark_back_side = !surface.front && result.radiance == glm::vec3(0.0F);
-    if (!surface.specular() || bounce == kMirrorBounces) return result;
-    throughput *= surface.fresnel;
-    ray = {offset_origin(surface, surface.reflection), surface.reflection};
+    if (!surface.specular() || bounce == kSpecularBounces) return result;
+    const SpecularBounce next = specular_bounce(surface, stream, bounce);
+    throughput *= surface.fresnel * next.weight;
+    if (throughput == glm::vec3(0.0F)) return result;
+    ray = {offset_origin(surface, next.direction), next.direction};
   }
 }
 

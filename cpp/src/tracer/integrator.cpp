@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "mirrorbake/tracer/lobe.hpp"
 #include "world.hpp"
 
 namespace mirrorbake::tracing {
@@ -23,62 +24,166 @@ float power_heuristic(float pdf, float other) {
   return 1.0F / (1.0F + ratio * ratio);
 }
 
-}  // namespace
+// A rough surface's lobe, its view in the lobe's frame.
+struct Lobe {
+  LobeShape shape;
+  Frame frame;
+  glm::vec3 view;
 
-glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec2 u, bool share_with_cosine) {
+  explicit Lobe(const Surface& s)
+      : shape{s.material->lobe, s.roughness, s.material->exponent},
+        frame(s.normal),
+        view(frame.to_local(s.view)) {}
+};
+
+// The lobe's Fresnel term as a multiple of `surface.fresnel`, which the layers hold (spec T5).
+glm::vec3 fresnel_ratio(const Surface& surface, const Lobe& lobe, glm::vec3 light) {
+  if (surface.material->fresnel.model == FresnelModel::constant || lobe.shape.lobe == SpecularLobe::phong)
+    return glm::vec3(1.0F);
+  const glm::vec3 f = fresnel_at(surface, lobe_fresnel_cosine(lobe.shape, lobe.view, light));
+  glm::vec3 ratio(0.0F);
+  for (int c = 0; c < 3; ++c) {
+    if (surface.fresnel[c] > 0.0F) ratio[c] = f[c] / surface.fresnel[c];
+  }
+  return ratio;
+}
+
+// Which lobes a followed ray samples as well, so that next-event estimation has to share with it.
+struct Partners {
+  bool cosine = false;
+  bool lobe = false;
+};
+
+struct DirectLight {
+  glm::vec3 irradiance{0.0F};
+  glm::vec3 lobe{0.0F};  ///< to be multiplied with `surface.fresnel`
+};
+
+DirectLight direct_light(const World& world, const Surface& surface, glm::vec2 u, Partners partners,
+                         bool for_lobe) {
   const std::optional<LightSample> light = world.lights.sample(surface.position, u);
-  if (!light) return glm::vec3(0.0F);
+  if (!light) return {};
   const float cosine = glm::dot(surface.normal, light->direction);
-  if (!(cosine > 0.0F) || !(glm::dot(surface.geometric_normal, light->direction) > 0.0F))
-    return glm::vec3(0.0F);
+  if (!(cosine > 0.0F) || !(glm::dot(surface.geometric_normal, light->direction) > 0.0F)) return {};
+
+  DirectLight found;
+  const auto share = [&](bool shared, float pdf) {
+    return shared && light->pdf > 0.0F ? power_heuristic(light->pdf, pdf) : 1.0F;
+  };
+  found.irradiance = share(partners.cosine, cosine * kInversePi) * cosine * light->radiance;
+  if (for_lobe) {
+    const Lobe lobe(surface);
+    const glm::vec3 direction = lobe.frame.to_local(light->direction);
+    const float response = lobe_response(lobe.shape, lobe.view, direction);
+    found.lobe = share(partners.lobe, lobe_density(lobe.shape, lobe.view, direction)) * response *
+                 fresnel_ratio(surface, lobe, direction) * light->radiance;
+    if (surface.albedo == glm::vec3(0.0F) && found.lobe == glm::vec3(0.0F)) return {};
+  }
 
   Ray shadow;
   shadow.origin = offset_origin(surface, light->direction);
   if (std::isfinite(light->distance)) {
     const glm::vec3 to = surface.position + light->distance * light->direction - shadow.origin;
     const float distance = glm::length(to);
-    if (!(distance > 0.0F)) return glm::vec3(0.0F);
+    if (!(distance > 0.0F)) return {};
     shadow.direction = to / distance;
     shadow.max_distance = distance * (1.0F - kShadowEpsilon);
   } else {
     shadow.direction = light->direction;
   }
-  if (world.rays.all().occluded(shadow)) return glm::vec3(0.0F);
-  float weight = 1.0F;
-  if (share_with_cosine && light->pdf > 0.0F) weight = power_heuristic(light->pdf, cosine * kInversePi);
-  return weight * cosine * light->radiance;
+  if (world.rays.all().occluded(shadow)) return {};
+  return found;
 }
 
-glm::vec3 body_radiance(const World& world, const Surface& surface, const PathLimits& limits,
-                        const SampleStream& stream, int bounce) {
-  if (surface.albedo == glm::vec3(0.0F)) return surface.emission;
-  const std::uint32_t dimension = dimension_base(bounce, 0);
-  const bool path = world.options.indirect == IndirectLight::path && limits.diffuse_depth > 0;
-  glm::vec3 irradiance = direct_irradiance(world, surface, stream.get(dimension + light_dimension), path);
+bool specular_follows(const Surface& surface, const PathLimits& limits, int bounce) {
+  return surface.specular() && bounce <= limits.specular_depth;
+}
+
+}  // namespace
+
+glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec2 u, bool share_with_cosine) {
+  return direct_light(world, surface, u, {.cosine = share_with_cosine}, false).irradiance;
+}
+
+ScatteredLight scattered_light(const World& world, const Surface& surface, const PathLimits& limits,
+                               const SampleStream& stream, int bounce) {
+  const bool has_body = surface.albedo != glm::vec3(0.0F);
+  const bool has_lobe = surface.rough() && specular_follows(surface, limits, bounce);
+  if (!has_body && !has_lobe) return {};
+  const bool path = has_body && world.options.indirect == IndirectLight::path && limits.diffuse_depth > 0;
+  const DirectLight direct =
+      direct_light(world, surface, stream.get(dimension_base(bounce, 0) + light_dimension),
+                   {.cosine = path, .lobe = true}, has_lobe);
+  ScatteredLight light;
+  light.lobe = direct.lobe;
+  if (!has_body) return light;
+  glm::vec3 irradiance = direct.irradiance;
   if (world.options.indirect == IndirectLight::cached) irradiance += world.cache.irradiance(surface);
-  glm::vec3 radiance = surface.emission + surface.albedo * kInversePi * irradiance;
-  if (path) radiance += surface.albedo * diffuse_path_radiance(world, surface, limits, stream, bounce);
-  return radiance;
+  light.body = surface.albedo * kInversePi * irradiance;
+  if (path) light.body += surface.albedo * diffuse_path_radiance(world, surface, limits, stream, bounce);
+  return light;
+}
+
+SpecularBounce specular_bounce(const Surface& surface, glm::vec2 u) {
+  if (!surface.rough()) return {surface.reflection, glm::vec3(1.0F), 0.0F};
+  const Lobe lobe(surface);
+  const glm::vec3 local = sample_lobe(lobe.shape, lobe.view, u);
+  SpecularBounce bounce;
+  bounce.direction = glm::normalize(lobe.frame.to_world(local));
+  bounce.pdf = lobe_density(lobe.shape, lobe.view, local);
+  if (!(bounce.pdf > 0.0F) || !(glm::dot(bounce.direction, surface.geometric_normal) > 0.0F)) return bounce;
+  bounce.weight =
+      lobe_response(lobe.shape, lobe.view, local) / bounce.pdf * fresnel_ratio(surface, lobe, local);
+  return bounce;
+}
+
+SpecularBounce specular_bounce(const Surface& surface, const SampleStream& stream, int bounce) {
+  const glm::vec2 u =
+      surface.rough() ? stream.get(dimension_base(bounce + 1, 0) + rough_dimension) : glm::vec2(0.0F);
+  return specular_bounce(surface, u);
+}
+
+glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf) {
+  if (hit.missed()) {
+    const glm::vec3 radiance = world.lights.environment_radiance(ray.direction);
+    if (!(pdf > 0.0F) || radiance == glm::vec3(0.0F)) return radiance;
+    return power_heuristic(pdf, world.lights.environment_pdf(ray.direction)) * radiance;
+  }
+  const int light = world.light_number(hit);
+  const glm::vec3 radiance = world.lights.hit_radiance(light, ray);
+  if (!(pdf > 0.0F) || radiance == glm::vec3(0.0F)) return radiance;
+  return power_heuristic(pdf, world.lights.hit_pdf(light, ray, hit.distance)) * radiance;
+}
+
+glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, const Surface& surface,
+                        float pdf) {
+  if (!(pdf > 0.0F) || surface.emission == glm::vec3(0.0F)) return surface.emission;
+  const float other =
+      world.lights.mesh_pdf(surface.object, surface.geometric_normal, ray.direction, hit.distance);
+  return power_heuristic(pdf, other) * surface.emission;
 }
 
 glm::vec3 radiance(const World& world, const Ray& first_ray, const Hit& first_hit, const PathLimits& limits,
-                   const SampleStream& stream, int bounce) {
+                   const SampleStream& stream, int bounce, float pdf) {
   glm::vec3 sum(0.0F);
   glm::vec3 throughput(1.0F);
   Ray ray = first_ray;
   Hit hit = first_hit;
   for (;; ++bounce) {
-    if (hit.missed()) return sum + throughput * world.lights.environment_radiance(ray.direction);
-    if (world.is_light(hit)) {
-      return sum + throughput * world.lights.rectangle_radiance(world.light_number(hit), ray.direction);
-    }
+    if (hit.missed() || world.is_light(hit)) return sum + throughput * emitted_light(world, ray, hit, pdf);
     const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
-    sum += throughput * body_radiance(world, surface, limits, stream, bounce);
-    if (!surface.specular() || bounce > limits.specular_depth) return sum;
+    const ScatteredLight scattered = scattered_light(world, surface, limits, stream, bounce);
+    sum += throughput * (emitted_light(world, ray, hit, surface, pdf) + scattered.body);
+    if (!specular_follows(surface, limits, bounce)) return sum;
     throughput *= surface.fresnel;
     if (throughput == glm::vec3(0.0F)) return sum;
-    ray = {offset_origin(surface, surface.reflection), surface.reflection};
-    hit = world.rays.all().intersect(ray);
+    sum += throughput * scattered.lobe;
+    const SpecularBounce next = specular_bounce(surface, stream, bounce);
+    throughput *= next.weight;
+    if (throughput == glm::vec3(0.0F)) return sum;
+    pdf = next.pdf;
+    ray = {offset_origin(surface, next.direction), next.direction};
+    hit = world.rays.all().intersect(ray, RayKind::reflection);
   }
 }
 
@@ -91,34 +196,14 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
   int specular_bounces = 0;
   glm::vec3 direction = sample_cosine_hemisphere(Frame(surface.normal),
                                                  stream.get(dimension_base(bounce, 0) + diffuse_dimension));
-  float pdf = glm::dot(surface.normal, direction) * kInversePi;
-  bool last_was_mirror = false;  // then next-event estimation had no chance, and emission counts in full
+  float pdf = glm::dot(surface.normal, direction) * kInversePi;  // 0 after a mirror: emission counts in full
   for (int vertex = 1;; ++vertex) {
-    if (!last_was_mirror && !(glm::dot(surface.geometric_normal, direction) > 0.0F)) return sum;
+    if (!(glm::dot(surface.geometric_normal, direction) > 0.0F)) return sum;
     const Ray ray{offset_origin(surface, direction), direction};
-    const Hit hit = world.rays.all().intersect(ray);
-    if (hit.missed()) {
-      const float weight =
-          last_was_mirror ? 1.0F : power_heuristic(pdf, world.lights.environment_pdf(direction));
-      return sum + throughput * weight * world.lights.environment_radiance(direction);
-    }
-    if (world.is_light(hit)) {
-      const int light = world.light_number(hit);
-      const float weight = last_was_mirror
-                               ? 1.0F
-                               : power_heuristic(pdf, world.lights.rectangle_pdf(light, surface.position,
-                                                                                 direction, hit.distance));
-      return sum + throughput * weight * world.lights.rectangle_radiance(light, direction);
-    }
-    const Surface next = surface_at(world.scene, world.rays, hit, direction);
-    if (next.emission != glm::vec3(0.0F)) {
-      const float weight =
-          last_was_mirror ? 1.0F
-                          : power_heuristic(pdf, world.lights.mesh_pdf(next.object, next.geometric_normal,
-                                                                       direction, hit.distance));
-      sum += throughput * weight * next.emission;
-    }
-    surface = next;
+    const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
+    if (hit.missed() || world.is_light(hit)) return sum + throughput * emitted_light(world, ray, hit, pdf);
+    surface = surface_at(world.scene, world.rays, hit, direction);
+    sum += throughput * emitted_light(world, ray, hit, surface, pdf);
 
     // One lobe at random, in proportion to what the lobes reflect.
     const std::uint32_t dimension =
@@ -128,32 +213,38 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
       return vertex <= 2 ? stream.get(dimension + use) : stream.get_independent(dimension + use);
     };
     const glm::vec2 choice = random(lobe_dimension);
-    const float diffuse_share = luminance(surface.albedo);
-    const float mirror_share = specular_bounces <= limits.specular_depth ? luminance(surface.fresnel) : 0.0F;
-    const bool has_diffuse = surface.albedo != glm::vec3(0.0F);
-    const bool continue_diffuse = diffuse_bounces < limits.diffuse_depth;
-    if (has_diffuse) {
-      sum += throughput * surface.albedo * kInversePi *
-             direct_irradiance(world, surface, random(light_dimension), continue_diffuse);
+    const bool has_body = surface.albedo != glm::vec3(0.0F);
+    const bool continue_diffuse = has_body && diffuse_bounces < limits.diffuse_depth;
+    const bool continue_specular = surface.specular() && specular_bounces <= limits.specular_depth;
+    const bool has_lobe = surface.rough() && continue_specular;
+    if (has_body || has_lobe) {
+      const DirectLight direct = direct_light(world, surface, random(light_dimension),
+                                              {.cosine = continue_diffuse, .lobe = true}, has_lobe);
+      sum += throughput * (surface.albedo * kInversePi * direct.irradiance + surface.fresnel * direct.lobe);
     }
-    const float total = (continue_diffuse ? diffuse_share : 0.0F) + mirror_share;
+    const float diffuse_share = continue_diffuse ? luminance(surface.albedo) : 0.0F;
+    const float specular_share = continue_specular ? luminance(surface.fresnel) : 0.0F;
+    const float total = diffuse_share + specular_share;
     if (!(total > 0.0F)) return sum;
-    const float mirror_probability = mirror_share / total;
-    if (choice.x < mirror_probability) {
-      throughput *= surface.fresnel / mirror_probability;
-      direction = surface.reflection;
+    const float specular_probability = specular_share / total;
+    if (choice.x < specular_probability) {
+      const SpecularBounce next =
+          specular_bounce(surface, surface.rough() ? random(rough_dimension) : glm::vec2(0.0F));
+      throughput *= surface.fresnel * next.weight / specular_probability;
+      direction = next.direction;
+      pdf = next.pdf;
       ++specular_bounces;
-      last_was_mirror = true;
     } else {
-      throughput *= surface.albedo / (1.0F - mirror_probability);
+      throughput *= surface.albedo / (1.0F - specular_probability);
       direction = sample_cosine_hemisphere(Frame(surface.normal), random(diffuse_dimension));
       pdf = glm::dot(surface.normal, direction) * kInversePi;
       ++diffuse_bounces;
-      last_was_mirror = false;
     }
     // Russian roulette from the third vertex on.
+    const float brightest = std::max(throughput.x, std::max(throughput.y, throughput.z));
+    if (!(brightest > 0.0F)) return sum;
     if (vertex >= 2) {
-      const float survival = std::min(0.95F, std::max(throughput.x, std::max(throughput.y, throughput.z)));
+      const float survival = std::min(0.95F, brightest);
       if (!(choice.y < survival)) return sum;
       throughput /= survival;
     }

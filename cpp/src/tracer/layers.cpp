@@ -2,18 +2,19 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "beauty.hpp"
 #include "camera_rays.hpp"
 #include "integrator.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "options.hpp"
-#include "primary_rays.hpp"
 #include "state.hpp"
 
 namespace mirrorbake {
@@ -25,6 +26,7 @@ using tracing::PathLimits;
 using tracing::PrimaryRow;
 using tracing::PrimarySample;
 using tracing::Ray;
+using tracing::RayKind;
 using tracing::RayScene;
 using tracing::SampleStream;
 using tracing::Surface;
@@ -45,6 +47,8 @@ void for_each_array(const Task& task) {
        &S::diffuse, &S::local, &S::distant, &S::hit_distance);
 }
 
+bool meets(const Hit& hit, int object) { return !hit.missed() && static_cast<int>(hit.geometry) == object; }
+
 /// One image row: its samples in order, and the beauty value of each where light is traced.
 struct Row {
   SurfaceSamples samples;
@@ -52,10 +56,10 @@ struct Row {
 };
 
 /// The rows one after the other. Empties them.
-SurfaceSamples concatenate(std::vector<Row>& rows, const Camera& camera, const TraceOptions& options) {
+SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, const TraceOptions& options) {
   SurfaceSamples all;
-  all.width = camera.width;
-  all.height = camera.height;
+  all.width = window.width;
+  all.height = window.height;
   all.samples_per_pixel = options.samples_per_pixel;
   for_each_array([&](auto member) {
     auto& whole = all.*member;
@@ -92,23 +96,29 @@ void record_surface(SurfaceSamples& out, const World& world, const Surface& s, f
   out.albedo.push_back(s.albedo);
 }
 
-/// The light that reaches the surface along its mirror direction, split by what the ray hits first.
+/// The light that arrives along a direction of the specular lobe, split by what the ray hits first.
 struct SpecularLayers {
   glm::vec4 local{0.0F};
   glm::vec3 distant{0.0F};
-  float hit_distance = 0.0F;
+  float hit_distance = std::numeric_limits<float>::infinity();
 };
 
+/// `lobe` is what next-event estimation found for the lobe.
 SpecularLayers trace_specular(const World& world, const RayScene::View& without_reflector,
-                              const Surface& surface, const PathLimits& limits, const SampleStream& stream) {
-  const Ray ray{tracing::offset_origin(surface, surface.reflection), surface.reflection};
+                              const Surface& surface, glm::vec3 lobe, const PathLimits& limits,
+                              const SampleStream& stream) {
   SpecularLayers layers;
-  Hit hit = world.rays.all().intersect(ray);
-  if (!hit.missed() && static_cast<int>(hit.geometry) == surface.object) {
-    layers.local = glm::vec4(tracing::radiance(world, ray, hit, limits, stream, 1), 1.0F);
-    hit = without_reflector.intersect(ray);
+  layers.distant = lobe;
+  const tracing::SpecularBounce bounce = tracing::specular_bounce(surface, stream, 0);
+  if (bounce.weight == glm::vec3(0.0F)) return layers;
+  const Ray ray{tracing::offset_origin(surface, bounce.direction), bounce.direction};
+  Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
+  if (meets(hit, surface.object)) {
+    const glm::vec3 incident = tracing::radiance(world, ray, hit, limits, stream, 1, bounce.pdf);
+    layers.local = glm::vec4(lobe + bounce.weight * incident, 1.0F);
+    hit = without_reflector.intersect(ray, RayKind::reflection);
   }
-  layers.distant = tracing::radiance(world, ray, hit, limits, stream, 1);
+  layers.distant += bounce.weight * tracing::radiance(world, ray, hit, limits, stream, 1, bounce.pdf);
   layers.hit_distance = hit.distance;
   return layers;
 }
@@ -127,7 +137,7 @@ void check_eye_outside(const World& world, const Camera& camera, int reflector) 
     const float radius = std::sqrt(std::max(0.0F, 1.0F - y * y));
     const float angle = 6.2831853F * u.y;
     const Ray ray{eye, glm::normalize(glm::vec3(radius * std::cos(angle), y, radius * std::sin(angle)))};
-    const Hit hit = world.rays.all().intersect(ray);
+    const Hit hit = world.rays.all().intersect(ray, RayKind::camera);
     if (hit.missed() || static_cast<int>(hit.geometry) != reflector) continue;
     if (!tracing::surface_at(world.scene, world.rays, hit, ray.direction).front) ++backs;
   }
@@ -140,9 +150,10 @@ void check_eye_outside(const World& world, const Camera& camera, int reflector) 
 // Sums over the covered samples of a pixel, then their means.
 class PixelLayers {
  public:
-  void add(const Surface& s, glm::vec3 body, const SpecularLayers& specular, glm::vec3 position,
-           std::uint16_t part) {
+  void add(const Surface& s, glm::vec3 beauty, glm::vec3 body, const SpecularLayers& specular,
+           glm::vec3 position, std::uint16_t part) {
     ++covered_;
+    beauty_ += beauty;
     diffuse_ += body;
     fresnel_ += s.fresnel;
     local_ += specular.local;
@@ -175,6 +186,10 @@ class PixelLayers {
     put(normal_);
     put(position_);
     *out++ = static_cast<float>(most_frequent_part());
+    const double share = covered_ > 0 ? 1.0 / covered_ : 0.0;
+    const glm::dvec3 of_means =
+        diffuse_ + fresnel_ * share * (glm::dvec3(local_) + (1.0 - local_.a * share) * distant_);
+    put(beauty_ - of_means);
   }
 
  private:
@@ -196,7 +211,8 @@ class PixelLayers {
   int covered_ = 0;
   int finite_distances_ = 0;
   double distance_ = 0.0;
-  glm::dvec3 diffuse_{0.0}, fresnel_{0.0}, distant_{0.0}, reflection_{0.0}, normal_{0.0}, position_{0.0};
+  glm::dvec3 beauty_{0.0}, diffuse_{0.0}, fresnel_{0.0}, distant_{0.0}, reflection_{0.0}, normal_{0.0},
+      position_{0.0};
   glm::dvec4 local_{0.0};
   std::vector<std::uint16_t> parts_;
 };
@@ -229,12 +245,13 @@ std::vector<std::string> channel_names() {
           "position.X",
           "position.Y",
           "position.Z",
-          "part"};
+          "part",
+          "covariance.R",
+          "covariance.G",
+          "covariance.B"};
 }
 
-void check_arguments(const World& world, const Camera& camera, int reflector, const TraceOptions& options) {
-  validate(camera);
-  tracing::validate(options);
+void check_reflector(const World& world, const Camera& camera, int reflector) {
   const auto count = static_cast<int>(world.scene.objects.size());
   if (reflector < 0 || reflector >= count) {
     throw InvalidArgument("reflector", std::to_string(reflector),
@@ -247,97 +264,132 @@ void check_arguments(const World& world, const Camera& camera, int reflector, co
   check_eye_outside(world, camera, reflector);
 }
 
-/// The samples of image row `y`.
-auto primary_row(const World& world, const Camera& camera, const CameraRays& rays,
+/// The samples of row `y` of the window.
+auto primary_row(const World& world, const Camera& camera, const CameraRays& rays, const PixelWindow& window,
                  const TraceOptions& options, std::size_t y) {
   const glm::vec3 eye = camera.eye - world.rays.origin();
-  return PrimaryRow(world.rays.all(), options.seed, camera.width, options.samples_per_pixel,
-                    static_cast<int>(y), [eye, &rays](glm::vec2 point) {
-                      return Ray{eye, rays.direction(point)};
-                    });
+  const tracing::RowSegment segment{
+      camera.width, window.y + static_cast<int>(y), window.x, window.width, 0, options.samples_per_pixel};
+  return PrimaryRow(world.rays.all(), options.seed, segment, [eye, &rays](glm::vec2 point) {
+    return Ray{eye, rays.direction(point)};
+  });
 }
 
-std::uint32_t pixel_number(const Camera& camera, std::size_t y, int x) {
-  return static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera.width) +
+std::uint32_t pixel_number(const PixelWindow& window, std::size_t y, int x) {
+  return static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(window.width) +
          static_cast<std::uint32_t>(x);
 }
-
-bool meets(const Hit& hit, int object) { return !hit.missed() && static_cast<int>(hit.geometry) == object; }
 
 }  // namespace
 
 LayerTrace Tracer::trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const {
+  return std::move(trace_layers(camera, {&reflector, 1}, options).front());
+}
+
+std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<const int> reflectors,
+                                             const TraceOptions& options) const {
   const World& world = state_->world;
-  check_arguments(world, camera, reflector, options);
+  validate(camera);
+  tracing::validate(options);
+  const PixelWindow window = tracing::window_in(options, camera.width, camera.height);
+  std::vector<int> number_of_object(world.scene.objects.size(), -1);
+  std::vector<RayScene::View> without;
+  for (int reflector : reflectors) {
+    check_reflector(world, camera, reflector);
+    int& number = number_of_object[static_cast<std::size_t>(reflector)];
+    if (number >= 0) {
+      throw InvalidArgument("reflectors", "object " + std::to_string(reflector) + " twice",
+                            "different objects");
+    }
+    number = static_cast<int>(without.size());
+    without.push_back(world.rays.without({&reflector, 1}));
+  }
   const CameraRays rays(camera);
-  const RayScene::View without_reflector = world.rays.without({&reflector, 1});
   const PathLimits limits{options.max_specular_depth, options.max_diffuse_depth};
 
-  LayerTrace trace;
-  trace.layers = Image(camera.width, camera.height, channel_names());
-  std::vector<Row> rows(static_cast<std::size_t>(camera.height));
-  parallel_for(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
+  std::vector<LayerTrace> traces(reflectors.size());
+  std::vector<std::vector<Row>> rows(reflectors.size());
+  for (std::size_t r = 0; r < traces.size(); ++r) {
+    traces[r].layers = Image(window.width, window.height, channel_names());
+    rows[r].resize(static_cast<std::size_t>(window.height));
+  }
+  tracing::ProgressCounter progress(options, static_cast<std::size_t>(window.height));
+  parallel_for(static_cast<std::size_t>(window.height), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
-      SurfaceSamples& out = rows[y].samples;
-      auto primary = primary_row(world, camera, rays, options, y);
-      for (int x = 0; x < camera.width; ++x) {
+      auto primary = primary_row(world, camera, rays, window, options, y);
+      for (int x = 0; x < window.width; ++x) {
         glm::dvec3 beauty(0.0);
-        PixelLayers mean;
+        std::vector<PixelLayers> means(traces.size());
         for (int i = 0; i < options.samples_per_pixel; ++i) {
           const PrimarySample& sample = primary.next();
-          const glm::vec3 value = tracing::radiance(world, sample.ray, sample.hit, limits, sample.stream, 0);
+          const glm::vec3 value =
+              tracing::radiance(world, sample.ray, sample.hit, limits, sample.stream, 0, 0.0F);
           beauty += glm::dvec3(value);
-          if (!meets(sample.hit, reflector)) continue;
+          if (sample.hit.missed() || world.is_light(sample.hit)) continue;
+          const int number = number_of_object[sample.hit.geometry];
+          if (number < 0) continue;
+          const auto r = static_cast<std::size_t>(number);
           const Surface surface =
               tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
-          const glm::vec3 body = tracing::body_radiance(world, surface, limits, sample.stream, 0);
+          const tracing::ScatteredLight scattered =
+              tracing::scattered_light(world, surface, limits, sample.stream, 0);
+          const glm::vec3 body = surface.emission + scattered.body;
           const SpecularLayers specular =
-              trace_specular(world, without_reflector, surface, limits, sample.stream);
+              trace_specular(world, without[r], surface, scattered.lobe, limits, sample.stream);
+          SurfaceSamples& out = rows[r][y].samples;
           record_surface(out, world, surface, sample.hit.distance,
-                         rays.direction_with_differentials(sample.point), pixel_number(camera, y, x));
+                         rays.direction_with_differentials(sample.point), pixel_number(window, y, x));
           out.diffuse.push_back(body);
           out.local.push_back(specular.local);
           out.distant.push_back(specular.distant);
           out.hit_distance.push_back(specular.hit_distance);
-          rows[y].beauty.push_back(value);
-          mean.add(surface, body, specular, out.position.back(), out.part.back());
+          rows[r][y].beauty.push_back(value);
+          means[r].add(surface, value, body, specular, out.position.back(), out.part.back());
         }
-        float* channels = trace.layers.at(x, static_cast<int>(y));
-        for (int c = 0; c < 3; ++c) channels[c] = static_cast<float>(beauty[c] / options.samples_per_pixel);
-        mean.write(channels + 3, options.samples_per_pixel);
+        for (std::size_t r = 0; r < traces.size(); ++r) {
+          float* channels = traces[r].layers.at(x, static_cast<int>(y));
+          for (int c = 0; c < 3; ++c) channels[c] = static_cast<float>(beauty[c] / options.samples_per_pixel);
+          means[r].write(channels + 3, options.samples_per_pixel);
+        }
       }
+      progress.step();
     }
   });
-  trace.samples = concatenate(rows, camera, options);
-  trace.sample_beauty.reserve(trace.samples.size());
-  for (const Row& row : rows) {
-    trace.sample_beauty.insert(trace.sample_beauty.end(), row.beauty.begin(), row.beauty.end());
+  for (std::size_t r = 0; r < traces.size(); ++r) {
+    traces[r].samples = concatenate(rows[r], window, options);
+    traces[r].sample_beauty.reserve(traces[r].samples.size());
+    for (const Row& row : rows[r]) {
+      traces[r].sample_beauty.insert(traces[r].sample_beauty.end(), row.beauty.begin(), row.beauty.end());
+    }
   }
-  return trace;
+  return traces;
 }
 
 SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
                                         const TraceOptions& options) const {
   const World& world = state_->world;
-  check_arguments(world, camera, reflector, options);
+  validate(camera);
+  tracing::validate(options);
+  const PixelWindow window = tracing::window_in(options, camera.width, camera.height);
+  check_reflector(world, camera, reflector);
   const CameraRays rays(camera);
-  std::vector<Row> rows(static_cast<std::size_t>(camera.height));
+  std::vector<Row> rows(static_cast<std::size_t>(window.height));
   parallel_for(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
-      auto primary = primary_row(world, camera, rays, options, y);
-      for (int x = 0; x < camera.width; ++x) {
+      auto primary = primary_row(world, camera, rays, window, options, y);
+      for (int x = 0; x < window.width; ++x) {
         for (int i = 0; i < options.samples_per_pixel; ++i) {
           const PrimarySample& sample = primary.next();
           if (!meets(sample.hit, reflector)) continue;
           const Surface surface =
               tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
           record_surface(rows[y].samples, world, surface, sample.hit.distance,
-                         rays.direction_with_differentials(sample.point), pixel_number(camera, y, x));
+                         rays.direction_with_differentials(sample.point), pixel_number(window, y, x));
         }
       }
     }
   });
-  return concatenate(rows, camera, options);
+  return concatenate(rows, window, options);
 }
 
 }  // namespace mirrorbake

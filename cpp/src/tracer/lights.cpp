@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "sample_stream.hpp"
 #include "surface.hpp"
 
 namespace mirrorbake::tracing {
@@ -95,6 +96,59 @@ struct SphericalRectangle {
 // digits.
 bool by_solid_angle(glm::vec3 centre, float diagonal, bool orthogonal, glm::vec3 position) {
   return orthogonal && glm::length(centre - position) < diagonal;
+}
+
+template <typename Rectangle>
+SphericalRectangle seen_from(const Rectangle& r, glm::vec3 position) {
+  return {r.unit_u, r.unit_v, r.width, r.height, glm::dvec3(r.corner) - glm::dvec3(position)};
+}
+
+// 1 − cosθ of the cone that a sphere fills; 0 from inside it.
+double cone_cap(double distance, float radius) {
+  const double sine = static_cast<double>(radius) / distance;
+  return sine < 1.0 ? sine * sine / (1.0 + std::sqrt(1.0 - sine * sine)) : 0.0;
+}
+
+// Unit radiance from a direction in the cone that the sphere fills.
+std::optional<LightSample> sample_sphere(glm::vec3 centre, float radius, glm::vec3 position, glm::vec2 u) {
+  const glm::dvec3 to = glm::dvec3(centre) - glm::dvec3(position);
+  const double distance = glm::length(to);
+  const double cap = cone_cap(distance, radius);
+  if (!(cap > 0.0)) return std::nullopt;
+  const double below_one = static_cast<double>(u.x) * cap;
+  const double sine2 = below_one * (2.0 - below_one);
+  const double cosine = 1.0 - below_one;
+  const double azimuth = 2.0 * std::numbers::pi * static_cast<double>(u.y);
+  const double sine = std::sqrt(std::max(0.0, sine2));
+  const Frame frame(glm::vec3(to / distance));
+  const glm::vec3 direction = glm::normalize(
+      frame.to_world({static_cast<float>(sine * std::cos(azimuth)),
+                      static_cast<float>(sine * std::sin(azimuth)), static_cast<float>(cosine)}));
+  const double r = radius;
+  const double half_chord = std::sqrt(std::max(0.0, r * r - distance * distance * sine2));
+  // The shadow ray ends a thousandth of the radius before the sphere: near the rim it hits early by some 1e-4.
+  const auto reach = static_cast<float>(std::max(0.0, distance * cosine - half_chord - 1e-3 * r));
+  const auto pdf = static_cast<float>(1.0 / (2.0 * std::numbers::pi * cap));
+  return LightSample{direction, reach, glm::vec3(1.0F / pdf), pdf};
+}
+
+// Unit intensity from a point.
+std::optional<LightSample> towards(glm::vec3 point, glm::vec3 position) {
+  const glm::vec3 to = point - position;
+  const float distance = glm::length(to);
+  if (!(distance > 0.0F)) return std::nullopt;
+  return LightSample{to / distance, distance, glm::vec3(1.0F / (distance * distance)), 0.0F};
+}
+
+// Mean of a texture's texels, the share of an emission that it lets through.
+glm::vec3 mean_texel(const Texture& texture) {
+  const Image& image = texture.image;
+  const std::size_t channels = image.channels.size();
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 0; i < image.pixels.size(); i += channels) {
+    for (std::size_t c = 0; c < 3; ++c) sum[static_cast<int>(c)] += image.pixels[i + (channels == 1 ? 0 : c)];
+  }
+  return glm::vec3(sum / static_cast<double>(image.pixels.size() / channels));
 }
 
 }  // namespace
@@ -201,7 +255,7 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
       rays_(&rays),
       meshes_(scene.objects.size()),
       mesh_probability_(scene.objects.size()),
-      rectangle_probability_(scene.rectangle_lights.size()) {
+      hit_probability_(scene.rectangle_lights.size() + scene.sphere_lights.size()) {
   for (std::size_t i = 0; i < scene.rectangle_lights.size(); ++i) {
     const RectangleLight& light = scene.rectangle_lights[i];
     Rectangle r;
@@ -223,13 +277,37 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
     rectangles_.push_back(r);
     add(Kind::rectangle, static_cast<int>(i), static_cast<double>(luminance(light.radiance) * r.area * kPi));
   }
+  const auto add_light = [&](Kind kind, std::size_t i, glm::vec3 strength, double power) {
+    add(kind, static_cast<int>(i), static_cast<double>(luminance(strength)) * power);
+  };
+  const double scene_disk =
+      std::numbers::pi * static_cast<double>(rays.radius()) * static_cast<double>(rays.radius());
+  for (std::size_t i = 0; i < scene.sphere_lights.size(); ++i) {
+    const SphereLight& light = scene.sphere_lights[i];
+    spheres_.push_back({light.centre - rays.origin(), light.radiance, light.radius});
+    const double radius = light.radius;
+    add_light(Kind::sphere, i, light.radiance, 4.0 * std::numbers::pi * std::numbers::pi * radius * radius);
+  }
   for (std::size_t i = 0; i < scene.point_lights.size(); ++i) {
     const PointLight& light = scene.point_lights[i];
     points_.push_back({light.position - rays.origin(), light.intensity});
-    add(Kind::point, static_cast<int>(i), static_cast<double>(luminance(light.intensity) * 4.0F * kPi));
+    add_light(Kind::point, i, light.intensity, 4.0 * std::numbers::pi);
+  }
+  for (std::size_t i = 0; i < scene.directional_lights.size(); ++i) {
+    add_light(Kind::directional, i, scene.directional_lights[i].irradiance, scene_disk);
+  }
+  for (std::size_t i = 0; i < scene.spot_lights.size(); ++i) {
+    const SpotLight& light = scene.spot_lights[i];
+    spots_.push_back({light.position - rays.origin(), light.intensity});
+    const double cone = 1.0 - std::cos(static_cast<double>(light.outer_degrees) * std::numbers::pi / 180.0);
+    add_light(Kind::spot, i, light.intensity, 2.0 * std::numbers::pi * cone);
   }
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const glm::vec3 emission = scene.materials[static_cast<std::size_t>(scene.objects[i].material)].emission;
+    const Material& material = scene.materials[static_cast<std::size_t>(scene.objects[i].material)];
+    glm::vec3 emission = material.emission;
+    if (luminance(emission) > 0.0F && material.emission_texture.texture >= 0) {
+      emission *= mean_texel(scene.textures[static_cast<std::size_t>(material.emission_texture.texture)]);
+    }
     if (luminance(emission) <= 0.0F) continue;
     const TriangleMesh& mesh = scene.objects[i].mesh;
     std::vector<double> areas;
@@ -241,13 +319,12 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
     meshes_[i].area_cdf.resize(areas.size() + 1);
     meshes_[i].area = static_cast<float>(
         normalise_cdf(meshes_[i].area_cdf.data(), areas.data(), static_cast<int>(areas.size())));
+    meshes_[i].is_reflected = (scene.objects[i].visibility & Visibility::reflection) != Visibility::none;
     add(Kind::mesh, static_cast<int>(i), static_cast<double>(luminance(emission) * meshes_[i].area * kPi));
   }
   if (scene.environment) {
     environment_.emplace(*scene.environment);
-    const double radius = rays.radius();
-    if (environment_->flux() > 0.0)
-      add(Kind::environment, 0, environment_->flux() * std::numbers::pi * radius * radius);
+    if (environment_->flux() > 0.0) add(Kind::environment, 0, environment_->flux() * scene_disk);
   }
 
   double total = 0.0;
@@ -264,7 +341,8 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
     light.probability = cdf_[i + 1] - cdf_[i];
     const auto index = static_cast<std::size_t>(light.index);
     if (light.kind == Kind::mesh) mesh_probability_[index] = light.probability;
-    if (light.kind == Kind::rectangle) rectangle_probability_[index] = light.probability;
+    if (light.kind == Kind::rectangle) hit_probability_[index] = light.probability;
+    if (light.kind == Kind::sphere) hit_probability_[rectangles_.size() + index] = light.probability;
     if (light.kind == Kind::environment) environment_probability_ = light.probability;
   }
 }
@@ -282,38 +360,28 @@ std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u) const
   std::optional<LightSample> sample;
   switch (light.kind) {
     case Kind::rectangle: sample = sample_rectangle(rectangles_[index], position, u); break;
-    case Kind::point: {
-      const glm::vec3 to = points_[index].position - position;
-      const float distance = glm::length(to);
-      if (distance > 0.0F)
-        sample = {to / distance, distance, points_[index].intensity / (distance * distance), 0.0F};
+    case Kind::sphere:
+      sample = sample_sphere(spheres_[index].centre, spheres_[index].radius, position, u);
+      if (sample) sample->radiance *= spheres_[index].radiance;
       break;
-    }
-    case Kind::mesh: {
-      const Mesh& mesh = meshes_[index];
-      const TriangleMesh& source = scene_->objects[index].mesh;
-      const CdfSample t = sample_cdf(mesh.area_cdf.data(), static_cast<int>(source.triangles.size()), u.x);
-      const glm::uvec3 corner = source.triangles[static_cast<std::size_t>(t.index)];
-      const std::span<const glm::vec3> p = rays_->positions(light.index);
-      const float root = std::sqrt(t.place);
-      const float b1 = root * (1.0F - u.y);
-      const float b2 = root * u.y;
-      const glm::vec3 point = (1.0F - b1 - b2) * p[corner.x] + b1 * p[corner.y] + b2 * p[corner.z];
-      const glm::dvec3 n = glm::cross(glm::dvec3(p[corner.y]) - glm::dvec3(p[corner.x]),
-                                      glm::dvec3(p[corner.z]) - glm::dvec3(p[corner.x]));
-      const glm::vec3 to = point - position;
-      const float distance = glm::length(to);
-      const double length = glm::length(n);
-      if (!(distance > 0.0F) || !(length > 0.0)) break;
-      const glm::vec3 direction = to / distance;
-      const float cosine = -glm::dot(direction, glm::vec3(n / length));
-      if (!(cosine > 0.0F)) break;
-      const float pdf = distance * distance / (mesh.area * cosine);
-      const glm::vec3 emission =
-          scene_->materials[static_cast<std::size_t>(scene_->objects[index].material)].emission;
-      sample = {direction, distance, emission / pdf, pdf};
+    case Kind::point:
+      sample = towards(points_[index].position, position);
+      if (sample) sample->radiance *= points_[index].intensity;
       break;
-    }
+    case Kind::directional:
+      sample =
+          LightSample{-scene_->directional_lights[index].direction, std::numeric_limits<float>::infinity(),
+                      scene_->directional_lights[index].irradiance, 0.0F};
+      break;
+    case Kind::spot:
+      sample = towards(spots_[index].position, position);
+      if (sample) {
+        const SpotLight& spot = scene_->spot_lights[index];
+        sample->radiance *= spot_falloff(spot, -glm::dot(spot.direction, sample->direction));
+        sample->radiance *= spot.intensity;
+      }
+      break;
+    case Kind::mesh: sample = sample_mesh(light.index, position, u); break;
     case Kind::environment: {
       const glm::vec3 direction = environment_->sample(u);
       const float pdf = environment_->pdf(direction);
@@ -331,6 +399,36 @@ std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u) const
   return sample;
 }
 
+std::optional<LightSample> Lights::sample_mesh(int object, glm::vec3 position, glm::vec2 u) const {
+  const auto index = static_cast<std::size_t>(object);
+  const Mesh& mesh = meshes_[index];
+  const TriangleMesh& source = scene_->objects[index].mesh;
+  const CdfSample t = sample_cdf(mesh.area_cdf.data(), static_cast<int>(source.triangles.size()), u.x);
+  const glm::uvec3 corner = source.triangles[static_cast<std::size_t>(t.index)];
+  const std::span<const glm::vec3> p = rays_->positions(object);
+  const float root = std::sqrt(t.place);
+  const float b1 = root * (1.0F - u.y);
+  const float b2 = root * u.y;
+  const glm::vec3 point = (1.0F - b1 - b2) * p[corner.x] + b1 * p[corner.y] + b2 * p[corner.z];
+  const glm::vec3 to = point - position;
+  const float distance = glm::length(to);
+  if (!(distance > 0.0F)) return std::nullopt;
+  const glm::vec3 direction = to / distance;
+  const float cosine = -glm::dot(direction, triangle_normal(p[corner.x], p[corner.y], p[corner.z]));
+  if (!(cosine > 0.0F)) return std::nullopt;
+  const Material& material = scene_->materials[static_cast<std::size_t>(scene_->objects[index].material)];
+  glm::vec3 emission = material.emission;
+  if (material.emission_texture.texture >= 0) {
+    glm::vec2 uv(0.0F);
+    if (!source.uvs.empty()) {
+      uv = (1.0F - b1 - b2) * source.uvs[corner.x] + b1 * source.uvs[corner.y] + b2 * source.uvs[corner.z];
+    }
+    emission *= texture_lookup(*scene_, material.emission_texture, uv);
+  }
+  const float pdf = distance * distance / (mesh.area * cosine);
+  return LightSample{direction, distance, emission / pdf, mesh.is_reflected ? pdf : 0.0F};
+}
+
 std::optional<LightSample> Lights::sample_rectangle(const Rectangle& r, glm::vec3 position,
                                                     glm::vec2 u) const {
   // One-sided.
@@ -338,7 +436,7 @@ std::optional<LightSample> Lights::sample_rectangle(const Rectangle& r, glm::vec
   glm::vec3 to;
   float pdf = 0.0F;
   if (by_solid_angle(r.centre, r.diagonal, r.orthogonal, position)) {
-    const SphericalRectangle seen(r.unit_u, r.unit_v, r.width, r.height, glm::dvec3(r.corner) - glm::dvec3(position));
+    const SphericalRectangle seen = seen_from(r, position);
     if (!(seen.solid_angle > 0.0)) return std::nullopt;
     to = glm::vec3(seen.sample(u));
     pdf = static_cast<float>(1.0 / seen.solid_angle);
@@ -364,19 +462,30 @@ float Lights::environment_pdf(glm::vec3 direction) const {
   return environment_probability_ > 0.0F ? environment_probability_ * environment_->pdf(direction) : 0.0F;
 }
 
-glm::vec3 Lights::rectangle_radiance(int light, glm::vec3 direction) const {
-  const Rectangle& r = rectangles_[static_cast<std::size_t>(light)];
-  return glm::dot(direction, r.normal) < 0.0F ? r.radiance : glm::vec3(0.0F);
+glm::vec3 Lights::hit_radiance(int light, const Ray& ray) const {
+  const auto index = static_cast<std::size_t>(light);
+  if (index < rectangles_.size()) {
+    const Rectangle& r = rectangles_[index];
+    return glm::dot(ray.direction, r.normal) < 0.0F ? r.radiance : glm::vec3(0.0F);
+  }
+  const Sphere& s = spheres_[index - rectangles_.size()];
+  return glm::length(ray.origin - s.centre) > s.radius ? s.radiance : glm::vec3(0.0F);
 }
 
-float Lights::rectangle_pdf(int light, glm::vec3 position, glm::vec3 direction, float distance) const {
-  const Rectangle& r = rectangles_[static_cast<std::size_t>(light)];
-  const float probability = rectangle_probability_[static_cast<std::size_t>(light)];
-  if (by_solid_angle(r.centre, r.diagonal, r.orthogonal, position)) {
-    const double solid_angle = SphericalRectangle(r.unit_u, r.unit_v, r.width, r.height, glm::dvec3(r.corner) - glm::dvec3(position)).solid_angle;
+float Lights::hit_pdf(int light, const Ray& ray, float distance) const {
+  const auto index = static_cast<std::size_t>(light);
+  const float probability = hit_probability_[index];
+  if (index >= rectangles_.size()) {
+    const Sphere& s = spheres_[index - rectangles_.size()];
+    const double cap = cone_cap(glm::length(glm::dvec3(s.centre) - glm::dvec3(ray.origin)), s.radius);
+    return cap > 0.0 ? probability / static_cast<float>(2.0 * std::numbers::pi * cap) : 0.0F;
+  }
+  const Rectangle& r = rectangles_[index];
+  if (by_solid_angle(r.centre, r.diagonal, r.orthogonal, ray.origin)) {
+    const double solid_angle = seen_from(r, ray.origin).solid_angle;
     return solid_angle > 0.0 ? probability * static_cast<float>(1.0 / solid_angle) : 0.0F;
   }
-  const float cosine = -glm::dot(direction, r.normal);
+  const float cosine = -glm::dot(ray.direction, r.normal);
   return cosine > 0.0F ? probability * distance * distance / (r.area * cosine) : 0.0F;
 }
 

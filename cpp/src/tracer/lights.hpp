@@ -15,7 +15,8 @@ struct LightSample {
   glm::vec3 direction{0.0F};  ///< unit
   float distance = 0.0F;      ///< +inf for the environment
   glm::vec3 radiance{0.0F};  ///< divided by the density: a sum over samples times the cosine gives irradiance
-  float pdf = 0.0F;          ///< density per solid angle of this direction; 0 for point lights
+  float pdf =
+      0.0F;  ///< density per solid angle of this direction; 0 if rays that are followed cannot find the light
 };
 
 /// The environment light: bilinear lookup and sampling by luminance.
@@ -59,15 +60,14 @@ class Lights {
   /// Density with which `sample` takes a direction that leaves the scene.
   float environment_pdf(glm::vec3 direction) const;
 
-  /// What a ray finds that hits rectangle light number `light`.
-  glm::vec3 rectangle_radiance(int light, glm::vec3 direction) const;
-  /// Densities with which `sample` at `position` takes the direction of a hit on a rectangle or an emissive
-  /// mesh.
-  float rectangle_pdf(int light, glm::vec3 position, glm::vec3 direction, float distance) const;
+  /// What a ray finds that hits light number `light`: the rectangles come first, then the spheres.
+  glm::vec3 hit_radiance(int light, const Ray& ray) const;
+  /// Densities with which `sample` at the ray's origin takes the direction of a hit on a light or an emissive mesh.
+  float hit_pdf(int light, const Ray& ray, float distance) const;
   float mesh_pdf(int object, glm::vec3 geometric_normal, glm::vec3 direction, float distance) const;
 
  private:
-  enum class Kind { rectangle, point, mesh, environment };
+  enum class Kind { rectangle, sphere, point, directional, spot, mesh, environment };
   struct Light {
     Kind kind;
     int index;  ///< into the scene's list, or of the object
@@ -84,6 +84,11 @@ class Lights {
   struct Mesh {
     std::vector<float> area_cdf;  ///< triangles + 1, in [0,1]
     float area = 0.0F;
+    bool is_reflected = true;  ///< rays that leave surfaces see it
+  };
+  struct Sphere {
+    glm::vec3 centre, radiance;
+    float radius;
   };
   struct Point {
     glm::vec3 position, intensity;
@@ -91,16 +96,19 @@ class Lights {
 
   void add(Kind kind, int index, double power);
   std::optional<LightSample> sample_rectangle(const Rectangle& r, glm::vec3 position, glm::vec2 u) const;
+  std::optional<LightSample> sample_mesh(int object, glm::vec3 position, glm::vec2 u) const;
 
   const Scene* scene_;
   const RayScene* rays_;
   std::vector<Light> lights_;
   std::vector<float> cdf_;  ///< lights + 1
   std::vector<Rectangle> rectangles_;
+  std::vector<Sphere> spheres_;
   std::vector<Point> points_;
+  std::vector<Point> spots_;             ///< with the intensity on the axis
   std::vector<Mesh> meshes_;             ///< per object; empty unless it emits
   std::vector<float> mesh_probability_;  ///< per object
-  std::vector<float> rectangle_probability_;
+  std::vector<float> hit_probability_;   ///< of the rectangles, then of the spheres
   float environment_probability_ = 0.0F;
   std::optional<EnvironmentSampler> environment_;
 };

@@ -7,5 +7,7 @@ namespace mirrorbake::tracing {
 /// Throws InvalidArgument unless `value` is in [low, high].
 void check_range(const char* argument, int value, int low, int high);
 void validate(const TraceOptions& options);
+/// The window of an image that the options mean. Throws InvalidArgument if it does not lie in the image.
+PixelWindow window_in(const TraceOptions& options, int width, int height);
 
 }  // namespace mirrorbake::tracing

@@ -19,21 +19,27 @@ struct PrimarySample {
   Hit hit;
 };
 
-/// The samples of one image row, pixel after pixel, traced a packet at a time.
+/// A piece of an image row, and which of its pixels' samples are meant. A sample's random numbers depend on the
+/// place of its pixel in the whole image.
+struct RowSegment {
+  int image_width = 0;
+  int row = 0;
+  int first_column = 0;
+  int columns = 0;
+  int first_sample = 0;
+  int samples = 0;
+};
+
+/// The samples of a row segment, pixel after pixel, traced a packet at a time.
 template <typename RayThrough>
 class PrimaryRow {
  public:
   /// `ray_through(point)` is the ray through a point of the image, in pixels.
-  PrimaryRow(const RayScene::View& view, std::uint64_t seed, int width, int samples_per_pixel, int row,
+  PrimaryRow(const RayScene::View& view, std::uint64_t seed, const RowSegment& segment,
              RayThrough ray_through)
-      : view_(view),
-        seed_(seed),
-        width_(static_cast<std::uint64_t>(width)),
-        samples_per_pixel_(static_cast<std::uint64_t>(samples_per_pixel)),
-        row_(static_cast<std::uint64_t>(row)),
-        ray_through_(ray_through) {}
+      : view_(view), seed_(seed), segment_(segment), ray_through_(ray_through) {}
 
-  /// To be called width × samples_per_pixel times.
+  /// To be called columns × samples times.
   const PrimarySample& next() {
     if (cursor_ == filled_) trace_packet();
     return samples_[cursor_++];
@@ -41,28 +47,31 @@ class PrimaryRow {
 
  private:
   void trace_packet() {
-    filled_ = static_cast<std::size_t>(
-        std::min<std::uint64_t>(kPacketSize, width_ * samples_per_pixel_ - next_sample_));
+    const auto per_pixel = static_cast<std::uint64_t>(segment_.samples);
+    const std::uint64_t all = static_cast<std::uint64_t>(segment_.columns) * per_pixel;
+    filled_ = static_cast<std::size_t>(std::min<std::uint64_t>(kPacketSize, all - next_sample_));
     cursor_ = 0;
     std::array<Ray, kPacketSize> rays;
     std::array<Hit, kPacketSize> hits;
     for (std::size_t i = 0; i < filled_; ++i, ++next_sample_) {
-      const std::uint64_t x = next_sample_ / samples_per_pixel_;
+      const std::uint64_t column = next_sample_ / per_pixel;
+      const std::uint64_t x = static_cast<std::uint64_t>(segment_.first_column) + column;
+      const std::uint64_t pixel =
+          static_cast<std::uint64_t>(segment_.row) * static_cast<std::uint64_t>(segment_.image_width) + x;
       PrimarySample& s = samples_[i];
-      s.stream = sample_stream(seed_, row_ * width_ + x,
-                               static_cast<std::uint32_t>(next_sample_ - x * samples_per_pixel_));
-      s.point = glm::vec2(x, row_) + s.stream.get(camera_dimension);
+      s.stream = sample_stream(seed_, pixel,
+                               static_cast<std::uint32_t>(segment_.first_sample) +
+                                   static_cast<std::uint32_t>(next_sample_ - column * per_pixel));
+      s.point = glm::vec2(x, segment_.row) + s.stream.get(camera_dimension);
       s.ray = rays[i] = ray_through_(s.point);
     }
-    view_.intersect_packet({rays.data(), filled_}, hits.data());
+    view_.intersect_packet({rays.data(), filled_}, hits.data(), RayKind::camera);
     for (std::size_t i = 0; i < filled_; ++i) samples_[i].hit = hits[i];
   }
 
   const RayScene::View& view_;
   std::uint64_t seed_;
-  std::uint64_t width_;
-  std::uint64_t samples_per_pixel_;
-  std::uint64_t row_;
+  RowSegment segment_;
   RayThrough ray_through_;
   std::uint64_t next_sample_ = 0;
   std::size_t cursor_ = 0;

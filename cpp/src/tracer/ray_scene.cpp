@@ -5,6 +5,7 @@
 #include <string>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
 
 #include "mirrorbake/core/error.hpp"
 
@@ -14,17 +15,30 @@ namespace {
 // Objects beyond the 31st, and the lights, share the last bit of Embree's 32-bit ray masks.
 constexpr unsigned kSharedBit = 1U << 31;
 
-// Reflectors are what gets hidden most, so they are the first to get a bit of their own.
+// Reflectors are what gets hidden most, and some objects are invisible to some rays: they are the first to get a bit
+// of their own.
 std::vector<unsigned> assign_mask_bits(const Scene& scene) {
-  std::vector<unsigned> bits(scene.objects.size() + scene.rectangle_lights.size(), kSharedBit);
+  std::vector<unsigned> bits(scene.objects.size(), kSharedBit);
+  const auto rank = [&](const Object& object) {
+    if (object.visibility != Visibility::all) return 0;
+    return scene.materials[static_cast<std::size_t>(object.material)].specular ? 1 : 2;
+  };
   int next = 0;
-  for (bool specular : {true, false}) {
+  for (int wanted = 0; wanted < 3; ++wanted) {
     for (std::size_t i = 0; i < scene.objects.size() && next < 31; ++i) {
-      const auto material = static_cast<std::size_t>(scene.objects[i].material);
-      if (scene.materials[material].specular == specular) bits[i] = 1U << next++;
+      if (rank(scene.objects[i]) == wanted) bits[i] = 1U << next++;
     }
   }
   return bits;
+}
+
+constexpr Visibility visibility_bit(RayKind kind) {
+  switch (kind) {
+    case RayKind::camera: return Visibility::camera;
+    case RayKind::reflection: return Visibility::reflection;
+    case RayKind::shadow: return Visibility::shadow;
+  }
+  return Visibility::all;
 }
 
 EmbreeGeometry make_geometry(RTCDevice device, std::span<const glm::vec3> positions,
@@ -38,6 +52,17 @@ EmbreeGeometry make_geometry(RTCDevice device, std::span<const glm::vec3> positi
   std::transform(positions.begin(), positions.end(), vertices, [&](glm::vec3 p) { return p - origin; });
   std::copy(triangles.begin(), triangles.end(), indices);
   rtcSetGeometryMask(geometry.get(), mask);
+  rtcCommitGeometry(geometry.get());
+  return geometry;
+}
+
+EmbreeGeometry make_ball(RTCDevice device, glm::vec3 centre, float radius) {
+  EmbreeGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_SPHERE_POINT));
+  auto* ball = static_cast<glm::vec4*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
+                                                               RTC_FORMAT_FLOAT4, sizeof(glm::vec4), 1));
+  if (ball == nullptr) throw Error("Embree could not allocate a sphere");
+  *ball = glm::vec4(centre, radius);
+  rtcSetGeometryMask(geometry.get(), kSharedBit);
   rtcCommitGeometry(geometry.get());
   return geometry;
 }
@@ -72,6 +97,7 @@ RayScene::RayScene(const Scene& scene)
   glm::vec3 high(std::numeric_limits<float>::lowest());
   for (const Object& object : scene.objects) {
     bounds_.push_back(bounds(object.mesh));
+    visibility_.push_back(object.visibility);
     low = glm::min(low, bounds_.back().min);
     high = glm::max(high, bounds_.back().max);
   }
@@ -83,6 +109,10 @@ RayScene::RayScene(const Scene& scene)
       low = glm::min(low, p);
       high = glm::max(high, p);
     }
+  }
+  for (const SphereLight& light : scene.sphere_lights) {
+    low = glm::min(low, light.centre - light.radius);
+    high = glm::max(high, light.centre + light.radius);
   }
   if (low.x <= high.x) {
     // Scenes around the world's origin keep their coordinates, bit for bit.
@@ -108,17 +138,20 @@ RayScene::RayScene(const Scene& scene)
   for (const auto& corners : light_corners) {
     geometries_.push_back(make_geometry(device_.get(), corners, halves, origin_, kSharedBit));
   }
-  scene_ = build({});
-  all_.scene_ = scene_.get();
+  for (const SphereLight& light : scene.sphere_lights) {
+    geometries_.push_back(make_ball(device_.get(), light.centre - origin_, light.radius));
+  }
+  scene_ = build(std::vector<bool>(scene.objects.size(), false));
+  all_ = without({});
 }
 
-EmbreeScene RayScene::build(std::span<const int> hidden) const {
+EmbreeScene RayScene::build(const std::vector<bool>& leave_out) const {
   EmbreeScene scene(rtcNewScene(device_.get()));
   // Without ROBUST about 1 ray in 30,000 slips between the triangles of a closed room.
   rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   for (std::size_t i = 0; i < geometries_.size(); ++i) {
-    if (std::find(hidden.begin(), hidden.end(), static_cast<int>(i)) != hidden.end()) continue;
+    if (i < leave_out.size() && leave_out[i]) continue;
     rtcAttachGeometryByID(scene.get(), geometries_[i].get(), static_cast<unsigned>(i));
   }
   rtcCommitScene(scene.get());
@@ -129,30 +162,50 @@ EmbreeScene RayScene::build(std::span<const int> hidden) const {
 }
 
 RayScene::View RayScene::without(std::span<const int> hidden) const {
-  View view = all_;
-  bool own_bits = masks_supported_;
+  const auto count = static_cast<std::size_t>(object_count_);
+  std::vector<bool> is_hidden(count, false);
   for (int object : hidden) {
     if (object < 0 || object >= object_count_) {
       throw InvalidArgument("hidden", std::to_string(object),
                             "object numbers below " + std::to_string(object_count_));
     }
-    own_bits = own_bits && mask_bits_[static_cast<std::size_t>(object)] != kSharedBit;
+    is_hidden[static_cast<std::size_t>(object)] = true;
   }
-  if (own_bits) {
-    for (int object : hidden) view.mask_ &= ~mask_bits_[static_cast<std::size_t>(object)];
-  } else if (!hidden.empty()) {
-    view.own_ = std::shared_ptr<std::remove_pointer_t<RTCScene>>(build(hidden));
-    view.scene_ = view.own_.get();
+  View view;
+  std::vector<bool> built_without;
+  for (RayKind kind : {RayKind::camera, RayKind::reflection, RayKind::shadow}) {
+    View::Visible& visible = view.visible_[static_cast<std::size_t>(kind)];
+    visible.scene = scene_.get();
+    std::vector<bool> leave_out = is_hidden;
+    bool masks_do = true;
+    for (std::size_t i = 0; i < count; ++i) {
+      if ((visibility_[i] & visibility_bit(kind)) == Visibility::none) leave_out[i] = true;
+      if (!leave_out[i]) continue;
+      visible.mask &= ~mask_bits_[i];
+      masks_do = masks_do && masks_supported_ && mask_bits_[i] != kSharedBit;
+    }
+    if (masks_do) continue;
+    visible.mask = ~0U;
+    // The kinds of rays mostly see the same.
+    const View::Visible* previous = kind == RayKind::camera ? nullptr : &visible - 1;
+    if (previous != nullptr && previous->own && built_without == leave_out) {
+      visible = *previous;
+    } else {
+      visible.own = std::shared_ptr<std::remove_pointer_t<RTCScene>>(build(leave_out));
+      visible.scene = visible.own.get();
+      built_without = leave_out;
+    }
   }
   return view;
 }
 
-Hit RayScene::View::intersect(const Ray& ray) const {
+Hit RayScene::View::intersect(const Ray& ray, RayKind kind) const {
+  const Visible& visible = visible_to(kind);
   RTCRayHit query;
-  query.ray = to_embree(ray, mask_);
+  query.ray = to_embree(ray, visible.mask);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  intersect1(scene_, query);
+  intersect1(visible.scene, query);
   Hit hit;
   if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
     hit = {query.ray.tfar, query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v};
@@ -160,7 +213,8 @@ Hit RayScene::View::intersect(const Ray& ray) const {
   return hit;
 }
 
-void RayScene::View::intersect_packet(std::span<const Ray> rays, Hit* hits) const {
+void RayScene::View::intersect_packet(std::span<const Ray> rays, Hit* hits, RayKind kind) const {
+  const Visible& visible = visible_to(kind);
   alignas(64) RTCRayHit16 query;
   alignas(64) int valid[kPacketSize];
   for (std::size_t i = 0; i < kPacketSize; ++i) {
@@ -175,13 +229,13 @@ void RayScene::View::intersect_packet(std::span<const Ray> rays, Hit* hits) cons
     query.ray.dir_z[i] = ray.direction.z;
     query.ray.time[i] = 0.0F;
     query.ray.tfar[i] = ray.max_distance;
-    query.ray.mask[i] = mask_;
+    query.ray.mask[i] = visible.mask;
     query.ray.id[i] = 0;
     query.ray.flags[i] = 0;
     query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
-  intersect16(valid, scene_, query);
+  intersect16(valid, visible.scene, query);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     hits[i] = {};
     if (query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
@@ -190,8 +244,9 @@ void RayScene::View::intersect_packet(std::span<const Ray> rays, Hit* hits) cons
 }
 
 bool RayScene::View::occluded(const Ray& ray) const {
-  RTCRay query = to_embree(ray, mask_);
-  occluded1(scene_, query);
+  const Visible& visible = visible_to(RayKind::shadow);
+  RTCRay query = to_embree(ray, visible.mask);
+  occluded1(visible.scene, query);
   return query.tfar < 0.0F;
 }
 

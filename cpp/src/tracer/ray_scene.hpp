@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -18,12 +19,17 @@ struct Ray {
   float max_distance = std::numeric_limits<float>::infinity();
 };
 
+/// Kinds of rays that see different sets of objects (Visibility).
+enum class RayKind { camera, reflection, shadow };
+
 inline constexpr std::size_t kPacketSize = 16;
 inline constexpr std::uint32_t kNoGeometry = RTC_INVALID_GEOMETRY_ID;
 
 struct Hit {
   float distance = std::numeric_limits<float>::infinity();
-  std::uint32_t geometry = kNoGeometry;  ///< object number, or object count + rectangle light number
+  /// Object number, or that of a light: object count + rectangle light number, or object count + rectangle light count +
+  /// sphere light number.
+  std::uint32_t geometry = kNoGeometry;
   std::uint32_t triangle = 0;
   float u = 0.0F;  ///< weight of the triangle's second vertex
   float v = 0.0F;  ///< and of its third
@@ -31,7 +37,7 @@ struct Hit {
   bool missed() const { return geometry == kNoGeometry; }
 };
 
-/// The scene's triangles in Embree: one geometry per object, then one per rectangle light. Coordinates are
+/// The scene in Embree: one geometry per object, then one per rectangle light and per sphere light. Coordinates are
 /// relative to `origin`, so that a scene far from the world's origin is traced with the precision of one
 /// close to it.
 class RayScene {
@@ -42,17 +48,23 @@ class RayScene {
   class View {
    public:
     /// Closest hit. The ray must be finite and its direction a unit vector.
-    Hit intersect(const Ray& ray) const;
+    Hit intersect(const Ray& ray, RayKind kind) const;
     /// Closest hits of up to kPacketSize rays that resemble each other: several times faster than one by one.
-    void intersect_packet(std::span<const Ray> rays, Hit* hits) const;
+    void intersect_packet(std::span<const Ray> rays, Hit* hits, RayKind kind) const;
+    /// Whether a shadow ray meets anything.
     bool occluded(const Ray& ray) const;
 
    private:
     friend class RayScene;
-    RTCScene scene_ = nullptr;
-    unsigned mask_ = ~0U;
-    std::shared_ptr<std::remove_pointer_t<RTCScene>>
-        own_;  ///< set when the view could not be made with a mask
+    /// What the rays of one kind can meet.
+    struct Visible {
+      RTCScene scene = nullptr;
+      unsigned mask = ~0U;
+      std::shared_ptr<std::remove_pointer_t<RTCScene>> own;  ///< set when a mask could not express it
+    };
+    const Visible& visible_to(RayKind kind) const { return visible_[static_cast<std::size_t>(kind)]; }
+
+    std::array<Visible, 3> visible_;
   };
 
   const View& all() const { return all_; }
@@ -69,11 +81,13 @@ class RayScene {
   float radius() const { return radius_; }
 
  private:
-  EmbreeScene build(std::span<const int> hidden) const;
+  /// `leave_out` holds an entry per object.
+  EmbreeScene build(const std::vector<bool>& leave_out) const;
 
   EmbreeDevice device_;
   std::vector<EmbreeGeometry> geometries_;
   EmbreeScene scene_;
+  std::vector<Visibility> visibility_;  ///< per object
   View all_;
   glm::vec3 origin_{0.0F};
   float radius_ = 0.0F;

@@ -29,10 +29,11 @@ inline SampleStream sample_stream(std::uint64_t seed, std::uint64_t pixel, std::
   return {hash64(seed, pixel), index};
 }
 
-/// Where each use finds its numbers: 64 dimensions for every bounce of the mirror path that starts at the
-/// eye.
+/// Where each use finds its numbers: for every bounce of the specular path that starts at the eye, the vertices of the
+/// diffuse path that leaves it there, and the uses at each of them.
 enum Dimension : std::uint32_t {
-  camera_dimension = 0,
+  camera_dimension = 0,   ///< of the first vertex
+  rough_dimension = 0,    ///< direction in a rough lobe; the first vertex's is found one bounce on
   light_dimension = 1,    ///< next-event estimation
   diffuse_dimension = 2,  ///< direction of a diffuse bounce
   lobe_dimension = 3,     ///< choice of a lobe and Russian roulette
@@ -59,6 +60,9 @@ struct Frame {
     const float b = n.x * n.y * a;
     tangent = {1.0F + sign * n.x * n.x * a, sign * b, -sign * n.x};
     bitangent = {b, sign + n.y * n.y * a, -n.y};
+  }
+  glm::vec3 to_local(glm::vec3 v) const {
+    return {glm::dot(v, tangent), glm::dot(v, bitangent), glm::dot(v, normal)};
   }
   glm::vec3 to_world(glm::vec3 v) const { return v.x * tangent + v.y * bitangent + v.z * normal; }
 };

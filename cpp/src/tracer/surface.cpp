@@ -14,6 +14,9 @@ namespace {
 // Light Transport Simulation and Rendering System, 2017, appendix A.3).
 constexpr float kLowestReflection = 0.01F;  // cosine to the geometric normal
 
+// A roughness texture may hold 0, where the lobe has no density; this one is narrower than float directions resolve.
+constexpr float kSmoothest = 1e-4F;
+
 glm::vec3 reflect_about(glm::vec3 view, glm::vec3 n) { return 2.0F * glm::dot(n, view) * n - view; }
 
 glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
@@ -49,6 +52,13 @@ glm::vec2 uv_at(const TriangleMesh& mesh, glm::uvec3 corner, const Hit& hit) {
 }
 
 }  // namespace
+
+glm::vec3 fresnel_at(const Surface& surface, float cosine) {
+  if (surface.reflectance_scale == glm::vec3(1.0F)) return evaluate(surface.material->fresnel, cosine);
+  Fresnel fresnel = surface.material->fresnel;
+  fresnel.r0 *= surface.reflectance_scale;
+  return evaluate(fresnel, cosine);
+}
 
 Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm::vec3 ray_direction) {
   Surface s;
@@ -87,6 +97,9 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
     s.normal = -s.normal;
   } else {
     s.emission = s.material->emission;
+    if (s.material->emission_texture.texture >= 0 && s.emission != glm::vec3(0.0F)) {
+      s.emission *= texture_lookup(scene, s.material->emission_texture, uv_at(mesh, corner, hit));
+    }
   }
 
   s.albedo = s.material->albedo;
@@ -96,7 +109,17 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
   if (s.material->specular) {
     s.normal = bend_normal(s.view, s.normal, s.geometric_normal);
     s.reflection = glm::normalize(reflect_about(s.view, s.normal));
-    s.fresnel = evaluate(s.material->fresnel, glm::dot(s.normal, s.view));
+    if (s.material->specular_texture.texture >= 0) {
+      s.reflectance_scale = texture_lookup(scene, s.material->specular_texture, uv_at(mesh, corner, hit));
+    }
+    s.fresnel = fresnel_at(s, glm::dot(s.normal, s.view));
+    if (s.material->lobe == SpecularLobe::ggx) {
+      s.roughness = s.material->roughness;
+      if (s.material->roughness_texture.texture >= 0) {
+        s.roughness *= texture_lookup(scene, s.material->roughness_texture, uv_at(mesh, corner, hit)).x;
+      }
+      s.roughness = std::max(s.roughness, kSmoothest);
+    }
     if (s.material->layers == LayerModel::coated) s.albedo *= 1.0F - s.fresnel;
   }
   return s;

@@ -23,11 +23,14 @@ struct Surface {
   glm::vec3 normal{0.0F};            ///< unit shading normal
   glm::vec3 view{0.0F};              ///< unit, towards where the ray came from
   glm::vec3 albedo{0.0F};            ///< with texture; times (1 − F) under a coat
-  glm::vec3 fresnel{0.0F};           ///< 0 unless specular
+  glm::vec3 fresnel{0.0F};           ///< at the cosine of normal and view; 0 unless specular
   glm::vec3 reflection{0.0F};        ///< unit mirror direction, above the geometric surface; only if specular
   glm::vec3 emission{0.0F};          ///< radiance emitted towards `view`
+  glm::vec3 reflectance_scale{1.0F};  ///< of the Fresnel term's r0, by a texture
+  float roughness = 0.0F;             ///< of the lobe `ggx`, with texture
 
   bool specular() const { return material->specular; }
+  bool rough() const { return specular() && material->lobe != SpecularLobe::mirror; }
 };
 
 /// `hit` must be a hit of an object (not of a light).
@@ -36,6 +39,9 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
 /// Origin for a ray that leaves the surface along `direction`: moved off the surface by the bound of its
 /// error.
 glm::vec3 offset_origin(const Surface& surface, glm::vec3 direction);
+
+/// Fresnel reflectance of a specular surface for a cosine to its facets, with textures.
+glm::vec3 fresnel_at(const Surface& surface, float cosine);
 
 /// How a surface's position and mirror direction change with the ray's direction ([Igehy 1999], §3.1).
 struct SurfaceDifferential {

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <memory>
+#include <span>
+#include <glm/geometric.hpp>
 
 #include "irradiance_cache.hpp"
 #include "lights.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
 #include "ray_scene.hpp"
+#include "surface.hpp"
 
 namespace mirrorbake::tracing {
 
@@ -23,7 +26,25 @@ struct World {
   IrradianceCache cache;  ///< empty unless options.indirect is `cached`
 
   bool is_light(const Hit& hit) const { return hit.geometry >= scene.objects.size(); }
+  /// Number of a light's hit among the rectangle lights, then the sphere lights.
   int light_number(const Hit& hit) const { return static_cast<int>(hit.geometry - scene.objects.size()); }
+
+  /// Unit normal of what a ray hits, on the side from which triangles are counter-clockwise and spheres are round.
+  glm::vec3 geometric_normal(const Ray& ray, const Hit& hit) const {
+    if (!is_light(hit)) {
+      const auto object = static_cast<int>(hit.geometry);
+      const std::span<const glm::vec3> p = rays.positions(object);
+      const glm::uvec3 t = scene.objects[hit.geometry].mesh.triangles[hit.triangle];
+      return triangle_normal(p[t.x], p[t.y], p[t.z]);
+    }
+    const auto number = static_cast<std::size_t>(light_number(hit));
+    if (number < scene.rectangle_lights.size()) {
+      const RectangleLight& light = scene.rectangle_lights[number];
+      return glm::vec3(glm::normalize(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v))));
+    }
+    const SphereLight& light = scene.sphere_lights[number - scene.rectangle_lights.size()];
+    return glm::normalize(ray.origin + hit.distance * ray.direction - (light.centre - rays.origin()));
+  }
 };
 
 }  // namespace mirrorbake::tracing

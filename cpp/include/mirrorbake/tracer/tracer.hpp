@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -30,21 +31,50 @@ struct TracerOptions {
   std::uint64_t seed = 0;  ///< of the cache
 };
 
+/// A rectangle of an image, in pixels from its top left corner.
+struct PixelWindow {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+
+  bool operator==(const PixelWindow&) const = default;
+};
+
 struct TraceOptions {
   int samples_per_pixel = 16;  ///< 1…65536, stratified
-  int max_specular_depth = 8;  ///< mirror bounces after the first, 0…64; beyond it the reflection is black
+  int max_specular_depth = 8;  ///< specular bounces after the first, 0…64; beyond it the reflection is black
   int max_diffuse_depth = 4;   ///< diffuse bounces of `IndirectLight::path`, 0…64
   std::uint64_t seed = 0;
+  /// The part of the camera's image to trace, its pixels as in the whole image; of no size: everything.
+  PixelWindow window;
+  /// Called with the finished share of the work, in (0,1], from one thread at a time.
+  std::function<void(double)> progress;
+};
+
+/// An image that was traced until its noise was below a limit.
+struct BeautyTrace {
+  Image image;  ///< channels R, G, B
+  /// Standard error of a pixel's luminance relative to the luminance, root mean square over the image's tiles as the limit is applied to each.
+  double noise = 0.0;
+  double mean_samples_per_pixel = 0.0;
+  double share_above = 0.0;  ///< of the tiles that samples_per_pixel ended before they reached the limit
 };
 
 /// The segmented layers of one reflector in one view ([PEM] §3, spec T4), averaged over each pixel: the channels are `R`,
 /// `G`, `B` for the beauty image, which has the surroundings too; `coverage`; `diffuse.R` …, `fresnel.R` …,
 /// `specular_local.R` … `specular_local.A`, `specular_distant.R` …, `distance`, `reflection.X` …, `normal.X` …,
-/// `position.X` …, means over the covered samples, 0 where there are none; and `part`, the most frequent one, −1 for
-/// none. `distance` averages the finite ones, and is +inf where all are infinite.
+/// `position.X` …, means over the covered samples, 0 where there are none; `part`, the most frequent one, −1 for
+/// none; and `covariance.R` …. `distance` averages the finite ones, and is +inf where all are infinite.
 ///
 /// Per sample, diffuse + fresnel · (local.rgb + (1 − local.a) · distant) is the beauty value up to float
-/// rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel.
+/// rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel: `covariance` is what has to be added
+/// to the same sum of means to get the mean beauty of the covered samples.
+///
+/// A rough reflector takes one direction of its lobe per sample. Its incident radiance is multiplied with the lobe's
+/// response for F = 1 over the direction's density, and with the Fresnel term of the facet over `fresnel`, which is that of the
+/// surface (spec T5). Lights that next-event estimation finds for the lobe are shared between the two ways by
+/// multiple importance sampling: the light's part is added to `distant`, and to `local` where α is 1.
 struct LayerTrace {
   Image layers;
   SurfaceSamples samples;  ///< with the traced light
@@ -55,7 +85,7 @@ struct LayerTrace {
 /// First hit of a ray. A miss has `distance` = +inf.
 struct RayHit {
   float distance = std::numeric_limits<float>::infinity();
-  std::int32_t object = -1;  ///< −1: nothing, or a rectangle light
+  std::int32_t object = -1;  ///< −1: nothing, or a light
   glm::vec3 normal{0.0F};    ///< unit geometric normal
 };
 
@@ -73,9 +103,20 @@ class Tracer {
   /// Image of everything, channels R, G, B.
   Image trace_beauty(const Camera& camera, const TraceOptions& options) const;
 
+  /// The same with as many samples as each tile of 16² pixels needs: 16, 32, 64 … until the standard error of its
+  /// pixels, root mean square, is at most `noise` (in (0, 1]) times the tile's mean luminance, or a tenth of the image's where that is
+  /// more; samples_per_pixel is the most it takes. The error is that of independent samples, which the stratified ones
+  /// undercut. What a tile has missed so far it cannot know of: rare bright paths are underestimated where it ends early.
+  BeautyTrace trace_beauty_to_noise(const Camera& camera, float noise, const TraceOptions& options) const;
+
   /// Layers of the object number `reflector`, whose material must be specular. Throws InvalidArgument for an eye inside
   /// it: in its bounding box, most directions meeting the back of its surface first.
   LayerTrace trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const;
+
+  /// The same for several reflectors, all different, which share the rays from the eye: one LayerTrace each, with the same bits as
+  /// alone.
+  std::vector<LayerTrace> trace_layers(const Camera& camera, std::span<const int> reflectors,
+                                       const TraceOptions& options) const;
 
   /// Only what is visible of `reflector`: the geometry part of SurfaceSamples, by the same camera rays as
   /// trace_layers with the same options.
@@ -90,6 +131,12 @@ class Tracer {
   /// First hits of arbitrary rays that pass through the objects in `hidden`. Throws InvalidArgument for a ray that is not finite or has no direction.
   std::vector<RayHit> intersect(std::span<const glm::vec3> origins, std::span<const glm::vec3> directions,
                                 std::span<const int> hidden) const;
+
+  /// The same into arrays of the rays' size, without normals: for those who have many rays. `object` is −1 for a miss and
+  /// for a light.
+  void intersect(std::span<const glm::vec3> origins, std::span<const glm::vec3> directions,
+                 std::span<const int> hidden, std::span<float> distance,
+                 std::span<std::int32_t> object) const;
 
   /// Irradiance (W m⁻²) on the front at every vertex of an object, all light included, the object itself taking part:
   /// the view-independent diffuse layer. An average over the quarter of each adjacent triangle next to the

@@ -1,5 +1,4 @@
-// Bytes as a mesh file: the first byte chooses the format. A FileError is the right answer to garbage; whatever else comes
-// back, a crash, a sanitizer's report or a mesh that does not validate, is a finding.
+// Bytes as a mesh file: the first byte chooses the format.
 #include <unistd.h>
 
 #include <cstddef>
@@ -8,10 +7,11 @@
 #include <fstream>
 #include <string>
 
+#include "fuzz_targets.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/scene/load.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+int fuzz_load_mesh(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const char* extensions[] = {".obj", ".gltf", ".glb"};
   static const std::string stem =

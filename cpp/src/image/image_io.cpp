@@ -1,5 +1,6 @@
 #include "mirrorbake/image/image_io.hpp"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <fstream>
 #include <memory>
 #include <new>
+#include <optional>
 #include <set>
 
 #include "mirrorbake/core/error.hpp"
@@ -38,18 +40,10 @@ const char* plugin_name(FileKind kind) {
 
 // Only these five readers ever see a file: OpenImageIO left to itself tries all of its plugins on one it does
 // not recognise.
-FileKind kind_from_content(const std::string& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) throw FileError(path, "does not exist");
-  if (!std::filesystem::is_regular_file(status)) throw FileError(path, "is not a file");
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw FileError(path, "cannot be read");
-  std::array<unsigned char, 8> head{};
-  in.read(reinterpret_cast<char*>(head.data()), head.size());
+FileKind kind_from_head(const std::string& name, std::span<const unsigned char> head) {
   const auto starts_with = [&](std::initializer_list<int> magic) {
-    return std::equal(magic.begin(), magic.end(), head.begin(),
-                      [](int a, unsigned char b) { return a == b; });
+    return head.size() >= magic.size() && std::equal(magic.begin(), magic.end(), head.begin(),
+                                                     [](int a, unsigned char b) { return a == b; });
   };
   if (starts_with({0x76, 0x2f, 0x31, 0x01})) return FileKind::exr;
   if (starts_with({'#', '?'})) return FileKind::hdr;
@@ -59,7 +53,19 @@ FileKind kind_from_content(const std::string& path) {
   }
   if (starts_with({0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a})) return FileKind::png;
   if (starts_with({0xff, 0xd8, 0xff})) return FileKind::jpeg;
-  throw FileError(path, "is not an EXR, HDR, TIFF, PNG or JPEG image");
+  throw FileError(name, "is not an EXR, HDR, TIFF, PNG or JPEG image");
+}
+
+FileKind kind_from_content(const std::string& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) throw FileError(path, "does not exist");
+  if (!std::filesystem::is_regular_file(status)) throw FileError(path, "is not a file");
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw FileError(path, "cannot be read");
+  std::array<unsigned char, 8> head{};
+  in.read(reinterpret_cast<char*>(head.data()), head.size());
+  return kind_from_head(path, head);
 }
 
 FileKind kind_from_extension(const std::string& path) {
@@ -76,14 +82,23 @@ FileKind kind_from_extension(const std::string& path) {
 
 // A JPEG decoder makes up what a truncated file lacks and carries on. Every complete file ends with an
 // end-of-image marker, possibly followed by a few bytes that programs append.
+constexpr std::string_view kEndOfJpeg = "\xff\xd9";
+constexpr std::size_t kJpegTail = 4096;
+
 bool jpeg_is_complete(const std::string& path) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = in.tellg();
-  const std::streamoff tail_size = std::min<std::streamoff>(size, 4096);
+  const std::streamoff tail_size = std::min<std::streamoff>(size, kJpegTail);
   std::string tail(static_cast<std::size_t>(tail_size), '\0');
   in.seekg(size - tail_size);
   in.read(tail.data(), tail_size);
-  return in && tail.find("\xff\xd9") != std::string::npos;
+  return in && tail.find(kEndOfJpeg) != std::string::npos;
+}
+
+bool jpeg_is_complete(std::span<const unsigned char> bytes) {
+  const auto tail = bytes.last(std::min(bytes.size(), kJpegTail));
+  return std::search(tail.begin(), tail.end(), kEndOfJpeg.begin(), kEndOfJpeg.end(),
+                     [](auto a, char b) { return a == static_cast<unsigned char>(b); }) != tail.end();
 }
 
 std::string size_text(std::int64_t width, std::int64_t height, int channels) {
@@ -164,13 +179,45 @@ void multiply_by_alpha(const OIIO::ImageSpec& spec, std::vector<float>& pixels) 
   }
 }
 
-Image read(const std::string& path, FileKind kind, const ImageLimits& limits) {
+// Deflate, in PNG and TIFF, gives at most 1032 bytes for one; JPEG 1024: six blocks of two bits at least for 16 × 16
+// pixels of 3 bytes, if its chroma is subsampled; LZW 2730. OpenEXR's DCT knows no such bound.
+void check_expansion(const std::string& name, FileKind kind, const OIIO::ImageSpec& spec, std::size_t size) {
+  if (kind == FileKind::exr) return;
+  const std::uint64_t most = (kind == FileKind::tiff ? std::uint64_t{2730} : std::uint64_t{1100}) * size;
+  const std::uint64_t texels =
+      std::max(static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height),
+               static_cast<std::uint64_t>(spec.full_width) * static_cast<std::uint64_t>(spec.full_height));
+  if (texels * spec.pixel_bytes(true) > most) {
+    throw FileError(name, "claims " + size_text(spec.width, spec.height, spec.nchannels) +
+                              ", more than its " + std::to_string(size) + " bytes can hold");
+  }
+}
+
+Image without_alpha(Image image, int alpha) {
+  const std::size_t channels = image.channels.size();
+  std::size_t to = 0;
+  for (std::size_t from = 0; from < image.pixels.size(); ++from) {
+    if (from % channels != static_cast<std::size_t>(alpha)) image.pixels[to++] = image.pixels[from];
+  }
+  image.pixels.resize(to);
+  image.channels.erase(image.channels.begin() + alpha);
+  return image;
+}
+
+Image read(const std::string& path, FileKind kind, const DecodeOptions& options,
+           std::optional<std::span<const unsigned char>> memory = std::nullopt) {
+  const ImageLimits& limits = options.limits;
+  std::optional<OIIO::Filesystem::IOMemReader> proxy;
   const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(plugin_name(kind));
   if (!input) throw FileError(path, "cannot be read: " + OIIO::geterror());
   // Unassociated alpha is multiplied in here, in linear light, and not by the reader in encoded values.
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   OIIO::ImageSpec spec;
+  if (memory) {
+    proxy.emplace(memory->data(), memory->size());
+    if (!input->set_ioproxy(&*proxy)) throw FileError(path, "cannot be read from memory");
+  }
   if (!input->open(path, spec, config)) throw FileError(path, "cannot be read: " + input->geterror());
   if (spec.deep) throw FileError(path, "holds deep samples, expected flat pixels");
   if (spec.depth > 1) throw FileError(path, "is a volume, expected an image");
@@ -182,6 +229,7 @@ Image read(const std::string& path, FileKind kind, const ImageLimits& limits) {
     spec.full_height = spec.height;
   }
   check_limits(path, spec.full_width, spec.full_height, spec.nchannels, limits);
+  if (memory) check_expansion(path, kind, spec, memory->size());
 
   Image image;
   image.width = spec.full_width;
@@ -195,15 +243,36 @@ Image read(const std::string& path, FileKind kind, const ImageLimits& limits) {
       input->has_error()) {
     throw FileError(path, "is damaged or truncated: " + input->geterror());
   }
-  if (is_integer(spec.format) && !says_linear(spec)) decode_srgb(spec, image.pixels);
-  if (spec.alpha_channel >= 0 && spec.get_int_attribute("oiio:UnassociatedAlpha") != 0) {
+  const bool is_encoded = options.transfer == Transfer::automatic
+                              ? is_integer(spec.format) && !says_linear(spec)
+                              : options.transfer == Transfer::srgb;
+  if (is_encoded) decode_srgb(spec, image.pixels);
+  if (options.alpha == AlphaUse::multiply && spec.alpha_channel >= 0 &&
+      spec.get_int_attribute("oiio:UnassociatedAlpha") != 0) {
     multiply_by_alpha(spec, image.pixels);
   }
   if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width ||
       spec.height != spec.full_height) {
     image.pixels = display_window(spec, image.pixels);
   }
+  if (options.alpha == AlphaUse::drop && spec.alpha_channel >= 0 && spec.nchannels > 1) {
+    return without_alpha(std::move(image), spec.alpha_channel);
+  }
   return image;
+}
+
+// Whatever goes wrong while `read` runs is the file's fault.
+template <typename Read>
+Image file_errors(const std::string& name, const Read& read_image) {
+  try {
+    return read_image();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw FileError(name, "does not fit into memory");
+  } catch (const std::exception& e) {
+    throw FileError(name, std::string("is damaged: ") + e.what());
+  }
 }
 
 OIIO::TypeDesc storage_type(const std::string& path, FileKind kind, PixelFormat format) {
@@ -315,15 +384,16 @@ std::vector<std::string> default_channels(int count) {
 Image load_image(const std::string& path, const ImageLimits& limits) {
   const FileKind kind = kind_from_content(path);
   if (kind == FileKind::jpeg && !jpeg_is_complete(path)) throw FileError(path, "is truncated");
-  try {
-    return read(path, kind, limits);
-  } catch (const Error&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw FileError(path, "does not fit into memory");
-  } catch (const std::exception& e) {
-    throw FileError(path, std::string("is damaged: ") + e.what());
-  }
+  return file_errors(path, [&] {
+    return read(path, kind, {limits, Transfer::automatic, AlphaUse::multiply});
+  });
+}
+
+Image decode_image(const std::string& name, std::span<const unsigned char> bytes,
+                   const DecodeOptions& options) {
+  const FileKind kind = kind_from_head(name, bytes);
+  if (kind == FileKind::jpeg && !jpeg_is_complete(bytes)) throw FileError(name, "is truncated");
+  return file_errors(name, [&] { return read(name, kind, options, bytes); });
 }
 
 SaveReport save_image(const std::string& path, const Image& image, PixelFormat format) {

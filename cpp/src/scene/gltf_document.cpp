@@ -7,6 +7,7 @@
 #include <exception>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <string>
 
 #include "file_bytes.hpp"
@@ -17,8 +18,10 @@ namespace {
 
 // tinygltf converts `extras` and `extensions` by recursion.
 constexpr int kMaxJsonDepth = 256;
+// How often a document may refer to the same file.
+constexpr int kMaxReads = 16;
 
-constexpr std::array<std::string_view, 6> kKnownExtensions = {
+constexpr std::array<std::string_view, 6> kKnown = {
     "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior",
     "KHR_materials_unlit", "KHR_mesh_quantization",           "KHR_texture_transform"};
 
@@ -64,7 +67,9 @@ std::string_view json_chunk(const std::string& path, std::string_view bytes) {
 // tinygltf asks for files by joining the directory and the reference; these callbacks let it see only what is inside.
 struct Directory {
   std::filesystem::path root;
-  std::string refused;  // the first reference that points outside
+  std::string refused;   // the first reference that points outside
+  std::string repeated;  // the first file that is referred to too often
+  std::map<std::filesystem::path, int> reads;
 
   std::optional<std::filesystem::path> resolve(const std::string& joined) {
     const std::string prefix = root.string() + "/";
@@ -83,8 +88,14 @@ bool file_exists(const std::string& joined, void* user) {
 
 bool read_whole_file(std::vector<unsigned char>* out, std::string* error, const std::string& joined,
                      void* user) {
-  const auto target = static_cast<Directory*>(user)->resolve(joined);
+  Directory& directory = *static_cast<Directory*>(user);
+  const auto target = directory.resolve(joined);
   if (!target) return false;
+  // Each reference holds a copy of the file: a short text must not fill the memory.
+  if (++directory.reads[*target] > kMaxReads) {
+    directory.repeated = joined;
+    return false;
+  }
   try {
     const std::string bytes = read_file(*target);
     out->assign(bytes.begin(), bytes.end());
@@ -121,10 +132,11 @@ Callbacks file_callbacks(Directory* directory) {
   return callbacks;
 }
 
-bool keep_encoded(tinygltf::Image* image, int, std::string*, std::string*, int, int,
-                  const unsigned char* bytes, int size, void*) {
+// Images in buffers and in files are read where they are when they are needed.
+bool keep_embedded(tinygltf::Image* image, int, std::string*, std::string*, int, int,
+                   const unsigned char* bytes, int size, void*) {
   image->as_is = true;
-  image->image.assign(bytes, bytes + size);
+  if (image->bufferView < 0 && image->uri.empty()) image->image.assign(bytes, bytes + size);
   return true;
 }
 
@@ -164,12 +176,8 @@ struct Elements {
 
 Elements locate(const std::string& path, const tinygltf::Model& model, int view_index, std::size_t offset,
                 std::size_t count, std::size_t element_size, const std::string& what) {
-  const tinygltf::BufferView& view = element(path, model.bufferViews, view_index, what + " buffer view");
-  const std::vector<unsigned char>& buffer = element(path, model.buffers, view.buffer, what + " buffer").data;
-  if (view.byteOffset > buffer.size() || view.byteLength > buffer.size() - view.byteOffset) {
-    fail(path, what + " buffer view " + std::to_string(view_index) + " ends beyond its buffer of " +
-                   std::to_string(buffer.size()) + " bytes");
-  }
+  const std::span<const unsigned char> bytes = view_bytes(path, model, view_index, what);
+  const tinygltf::BufferView& view = model.bufferViews[static_cast<std::size_t>(view_index)];
   // glTF 2.0 §3.6.2.4 allows 4 to 252.
   const std::size_t stride = view.byteStride == 0 ? element_size : view.byteStride;
   if (stride < element_size || stride > 252) {
@@ -182,7 +190,7 @@ Elements locate(const std::string& path, const tinygltf::Model& model, int view_
     fail(path, what + " accessor with " + std::to_string(count) +
                    " elements ends beyond its buffer view of " + std::to_string(view.byteLength) + " bytes");
   }
-  return {buffer.data() + view.byteOffset + offset, stride};
+  return {bytes.data() + offset, stride};
 }
 
 template <typename Component>
@@ -254,6 +262,10 @@ void apply_sparse(const std::string& path, const tinygltf::Model& model, const t
 
 }  // namespace
 
+bool is_known_extension(std::string_view name) {
+  return std::find(kKnown.begin(), kKnown.end(), name) != kKnown.end();
+}
+
 void fail(const std::string& path, std::string_view problem) { throw FileError(path, problem); }
 
 tinygltf::Model read_document(const std::string& path) {
@@ -263,9 +275,9 @@ tinygltf::Model read_document(const std::string& path) {
   check_json(path, binary ? json_chunk(path, bytes) : std::string_view(bytes));
 
   std::error_code code;
-  Directory directory{std::filesystem::weakly_canonical(path, code).parent_path(), {}};
+  Directory directory{std::filesystem::weakly_canonical(path, code).parent_path(), {}, {}, {}};
   tinygltf::TinyGLTF loader;
-  loader.SetImageLoader(keep_encoded, nullptr);
+  loader.SetImageLoader(keep_embedded, nullptr);
   loader.SetFsCallbacks(file_callbacks<tinygltf::FsCallbacks>(&directory));
   tinygltf::Model model;
   std::string errors;
@@ -284,13 +296,28 @@ tinygltf::Model read_document(const std::string& path) {
   if (!directory.refused.empty()) {
     fail(path, "refers to '" + directory.refused + "', which is not inside the file's own directory");
   }
+  if (!directory.repeated.empty()) {
+    fail(path, "refers to one file more than " + std::to_string(kMaxReads) + " times: " + directory.repeated);
+  }
   if (!is_good) fail(path, "is not a valid glTF file: " + one_line(errors));
   for (const std::string& extension : model.extensionsRequired) {
-    if (std::find(kKnownExtensions.begin(), kKnownExtensions.end(), extension) == kKnownExtensions.end()) {
+    if (!is_known_extension(extension)) {
       fail(path, "requires the extension " + extension + ", which is not supported");
     }
   }
   return model;
+}
+
+std::span<const unsigned char> view_bytes(const std::string& path, const tinygltf::Model& model,
+                                          int view_index, std::string_view what) {
+  const std::string name(what);
+  const tinygltf::BufferView& view = element(path, model.bufferViews, view_index, name + " buffer view");
+  const std::vector<unsigned char>& buffer = element(path, model.buffers, view.buffer, name + " buffer").data;
+  if (view.byteOffset > buffer.size() || view.byteLength > buffer.size() - view.byteOffset) {
+    fail(path, name + " buffer view " + std::to_string(view_index) + " ends beyond its buffer of " +
+                   std::to_string(buffer.size()) + " bytes");
+  }
+  return std::span(buffer).subspan(view.byteOffset, view.byteLength);
 }
 
 std::size_t element_count(const std::string& path, const tinygltf::Model& model, int accessor,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,10 +13,17 @@
 /// A parsed .gltf or .glb file that is distrusted until each access has been checked.
 namespace mirrorbake::gltf {
 
-/// Parses the file and reads its buffers. Buffers and images outside the file's directory are refused, images are
-/// kept as encoded bytes. Throws FileError for anything malformed, JSON nested deeper than 256 levels, and
+/// Parses the file and reads its buffers. Buffers and images outside the file's directory are refused. Images of data
+/// URIs are kept as encoded bytes, others not at all. Throws FileError for anything malformed, JSON nested deeper than 256 levels, and
 /// extensions that the file requires but this reader does not know.
 tinygltf::Model read_document(const std::string& path);
+
+/// Whether the name is that of an extension that this reader applies.
+bool is_known_extension(std::string_view name);
+
+/// Bytes of a buffer view, its place checked.
+std::span<const unsigned char> view_bytes(const std::string& path, const tinygltf::Model& model, int view,
+                                          std::string_view what);
 
 /// Numbers of one accessor, row by row, as glTF defines them: integers that are `normalized` become [0,1] or
 /// [−1,1]; sparse replacements are applied.

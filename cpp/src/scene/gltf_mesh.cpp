@@ -10,6 +10,7 @@
 #include <glm/vec4.hpp>
 
 #include "gltf_document.hpp"
+#include "gltf_mesh.hpp"
 #include "gltf_nodes.hpp"
 #include "loaded_mesh.hpp"
 
@@ -45,10 +46,11 @@ std::vector<glm::uvec3> triangles_of(const std::string& path, int mode,
 
 class GltfBuilder {
  public:
-  GltfBuilder(const std::string& path, const tinygltf::Model& model, const MeshLimits& limits)
-      : path_(path), model_(model), limits_(limits) {}
+  GltfBuilder(const std::string& path, const tinygltf::Model& model, const MeshLimits& limits,
+              const gltf::UvSetOfMaterial& uv_set)
+      : path_(path), model_(model), limits_(limits), uv_set_(uv_set) {}
 
-  void add_node(const tinygltf::Node& node, const glm::dmat4& world_from_node) {
+  void add_node(int index, const tinygltf::Node& node, const glm::dmat4& world_from_node) {
     if (node.mesh < 0) return;
     const tinygltf::Mesh& mesh = gltf::element(path_, model_.meshes, node.mesh, "mesh");
     const std::size_t first_vertex = loaded_.mesh.positions.size();
@@ -58,7 +60,7 @@ class GltfBuilder {
       const bool has_triangles = primitive.mode == TINYGLTF_MODE_TRIANGLES ||
                                  primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP ||
                                  primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN;
-      if (has_triangles) add_primitive(primitive, name, world_from_node);
+      if (has_triangles) add_primitive(primitive, index, name, world_from_node);
     }
     complete_normals(loaded_.mesh, first_vertex, first_triangle);
   }
@@ -69,12 +71,12 @@ class GltfBuilder {
   }
 
  private:
-  static int attribute(const tinygltf::Primitive& primitive, const char* name) {
+  static int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
     const auto it = primitive.attributes.find(name);
     return it == primitive.attributes.end() ? -1 : it->second;
   }
 
-  void add_primitive(const tinygltf::Primitive& primitive, const std::string& name,
+  void add_primitive(const tinygltf::Primitive& primitive, int node, const std::string& name,
                      const glm::dmat4& world_from_node) {
     TriangleMesh& mesh = loaded_.mesh;
     const int position_accessor = attribute(primitive, "POSITION");
@@ -98,7 +100,7 @@ class GltfBuilder {
     add_normals(primitive, vertex_count, world_from_node);
     add_uvs(primitive, vertex_count);
 
-    loaded_.groups.push_back({name, primitive.material, mesh.triangles.size()});
+    loaded_.groups.push_back({name, node, primitive.material, mesh.triangles.size()});
     const bool is_mirrored = glm::determinant(glm::dmat3(world_from_node)) < 0.0;
     for (const glm::uvec3 t : triangles) {
       mesh.triangles.push_back((is_mirrored ? glm::uvec3(t.x, t.z, t.y) : t) + first);
@@ -158,7 +160,7 @@ class GltfBuilder {
 
   void add_uvs(const tinygltf::Primitive& primitive, std::size_t vertex_count) {
     TriangleMesh& mesh = loaded_.mesh;
-    const int accessor = attribute(primitive, "TEXCOORD_0");
+    const int accessor = attribute(primitive, "TEXCOORD_" + std::to_string(uv_set_(primitive.material)));
     mesh.uvs.resize(mesh.positions.size(), glm::vec2(0.0F));
     if (accessor < 0) return;
     const gltf::Numbers uvs =
@@ -178,19 +180,25 @@ class GltfBuilder {
   const std::string& path_;
   const tinygltf::Model& model_;
   const MeshLimits& limits_;
+  const gltf::UvSetOfMaterial& uv_set_;
   LoadedMesh loaded_;
   bool has_uvs_ = false;
 };
 
 }  // namespace
 
-LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits) {
-  const tinygltf::Model model = gltf::read_document(path);
-  GltfBuilder builder(path, model, limits);
-  gltf::visit_nodes(path, model, [&](int, const tinygltf::Node& node, const glm::dmat4& world_from_node) {
-    builder.add_node(node, world_from_node);
-  });
+LoadedMesh gltf::read_meshes(const std::string& path, const tinygltf::Model& model, const MeshLimits& limits,
+                             const UvSetOfMaterial& uv_set) {
+  GltfBuilder builder(path, model, limits, uv_set);
+  gltf::visit_nodes(path, model,
+                    [&](int index, const tinygltf::Node& node, const glm::dmat4& world_from_node) {
+                      builder.add_node(index, node, world_from_node);
+                    });
   return builder.finish();
+}
+
+LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits) {
+  return gltf::read_meshes(path, gltf::read_document(path), limits, [](int) { return 0; });
 }
 
 }  // namespace mirrorbake

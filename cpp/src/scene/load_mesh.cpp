@@ -8,7 +8,6 @@
 #include "mirrorbake/scene/load.hpp"
 
 namespace mirrorbake {
-namespace {
 
 std::string lower_extension(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();
@@ -16,8 +15,6 @@ std::string lower_extension(const std::string& path) {
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;
 }
-
-}  // namespace
 
 TriangleMesh load_mesh(const std::string& path, const MeshLimits& limits) {
   const std::string extension = lower_extension(path);

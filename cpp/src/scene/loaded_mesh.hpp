@@ -14,6 +14,7 @@ namespace mirrorbake {
 /// A stretch of triangles that belong together in the file.
 struct MeshGroup {
   std::string name;
+  int owner = 0;                   ///< number of the glTF node or OBJ object
   int material = -1;               ///< index into the file's materials, −1: none
   std::size_t first_triangle = 0;  ///< up to the next group's
 };
@@ -24,8 +25,17 @@ struct LoadedMesh {
   std::vector<MeshGroup> groups;
 };
 
-LoadedMesh read_obj(const std::string& path, const MeshLimits& limits);
+/// What an OBJ file says besides its triangles.
+struct ObjMaterials {
+  std::vector<std::string> names;      ///< of the materials that its groups use, by number
+  std::vector<std::string> libraries;  ///< what follows each `mtllib`
+};
+
+LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjMaterials* materials = nullptr);
 LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits);
+
+/// Extension of a file name in lower case, with its dot.
+std::string lower_extension(const std::string& path);
 
 /// Throws FileError naming the first vertex, from number `first` on, that is not finite or beyond what a scene accepts.
 void check_positions(const std::string& path, const std::vector<glm::vec3>& positions, std::size_t first = 0);

@@ -8,6 +8,8 @@
 #include <streambuf>
 #include <string>
 #include <string_view>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <tiny_obj_loader.h>
@@ -15,6 +17,7 @@
 #include "file_bytes.hpp"
 #include "loaded_mesh.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mtl.hpp"
 #include "polygon.hpp"
 
 namespace mirrorbake {
@@ -87,6 +90,18 @@ void check_tokens(const std::string& path, std::string_view text) {
   }
 }
 
+// tinyobjloader would cut the names of files at spaces.
+std::vector<std::string> material_libraries(std::string_view text) {
+  std::vector<std::string> libraries;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+    const auto [keyword, rest] = mtl::split_keyword(text.substr(0, end));
+    if (keyword == "mtllib" && !rest.empty()) libraries.emplace_back(rest);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return libraries;
+}
+
 /// Builds the mesh as tinyobjloader calls back, line by line.
 class ObjBuilder {
  public:
@@ -123,8 +138,17 @@ class ObjBuilder {
     check_limits(path_, mesh.positions.size(), mesh.triangles.size(), limits_);
   }
 
-  void set_name(std::string name) { start_group(std::move(name), material_); }
-  void set_material(int material) { start_group(group_name_, material); }
+  void set_name(std::string name) {
+    owner_ = number_of(owners_, name);
+    start_group(std::move(name), material_);
+  }
+  void set_material(const std::string& name) {
+    const int material = number_of(materials_, name);
+    if (static_cast<std::size_t>(material) == material_names_.size()) material_names_.push_back(name);
+    start_group(group_name_, material);
+  }
+
+  std::vector<std::string>& material_names() { return material_names_; }
 
   LoadedMesh finish() {
     if (!has_uvs_) loaded_.mesh.uvs.clear();
@@ -160,12 +184,16 @@ class ObjBuilder {
     return vertex;
   }
 
+  static int number_of(std::unordered_map<std::string, int>& numbers, const std::string& name) {
+    return numbers.emplace(name, static_cast<int>(numbers.size())).first->second;
+  }
+
   void start_group(std::string name, int material) {
     group_name_ = std::move(name);
     material_ = material;
     const std::size_t first = loaded_.mesh.triangles.size();
     if (!loaded_.groups.empty() && loaded_.groups.back().first_triangle == first) loaded_.groups.pop_back();
-    loaded_.groups.push_back({group_name_, material_, first});
+    loaded_.groups.push_back({group_name_, owner_, material_, first});
   }
 
   struct Use {
@@ -180,7 +208,10 @@ class ObjBuilder {
   std::vector<Use> uses_;                 // of each vertex of the mesh
   LoadedMesh loaded_;
   std::string group_name_;
+  int owner_ = -1;
   int material_ = -1;
+  std::unordered_map<std::string, int> owners_, materials_;  // numbers of names
+  std::vector<std::string> material_names_;
   std::size_t face_ = 0;
   bool has_uvs_ = false;
   std::vector<std::uint32_t> corners_, vertices_;  // of the current face
@@ -199,18 +230,17 @@ tinyobj::callback_t callbacks() {
   calls.index_cb = [](void* b, tinyobj::index_t* indices, int count) {
     static_cast<ObjBuilder*>(b)->add_face(indices, count);
   };
-  calls.usemtl_cb = [](void* b, const char*, int material) {
-    static_cast<ObjBuilder*>(b)->set_material(material);
-  };
+  calls.usemtl_cb = [](void* b, const char* name, int) { static_cast<ObjBuilder*>(b)->set_material(name); };
   calls.object_cb = [](void* b, const char* name) { static_cast<ObjBuilder*>(b)->set_name(name); };
   return calls;
 }
 
 }  // namespace
 
-LoadedMesh read_obj(const std::string& path, const MeshLimits& limits) {
+LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjMaterials* materials) {
   std::string text = read_file(path);
   check_tokens(path, text);
+  if (materials != nullptr) materials->libraries = material_libraries(text);
   MemoryBuffer buffer(text);
   std::istream stream(&buffer);
   ObjBuilder builder(path, limits);
@@ -219,6 +249,7 @@ LoadedMesh read_obj(const std::string& path, const MeshLimits& limits) {
   if (!tinyobj::LoadObjWithCallback(stream, callbacks(), &builder, nullptr, &warnings, &errors)) {
     throw FileError(path, "is not a valid OBJ file: " + errors);
   }
+  if (materials != nullptr) materials->names = std::move(builder.material_names());
   LoadedMesh loaded = builder.finish();
   check_positions(path, loaded.mesh.positions);
   complete_normals(loaded.mesh);

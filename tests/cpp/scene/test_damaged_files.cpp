@@ -1,15 +1,18 @@
-// Files damaged at random, by the entry point that libFuzzer uses too (tests/fuzz): each loads or is a FileError.
+// Files damaged at random, by the entry points that libFuzzer uses too (tests/fuzz): each loads or is a FileError.
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "fuzz_targets.hpp"
+#include "gltf_files.hpp"
+#include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/scene/load.hpp"
 #include "temporary_files.hpp"
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace mirrorbake {
 namespace {
@@ -20,9 +23,10 @@ constexpr char kObj = 0;
 constexpr char kGltf = 1;
 constexpr char kGlb = 2;
 
-void run(char format, const std::string& bytes) {
+void run(char format, const std::string& bytes,
+         int (*entry)(const std::uint8_t*, std::size_t) = fuzz_load_mesh) {
   const std::string input = format + bytes;
-  EXPECT_NO_THROW(LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size()));
+  EXPECT_NO_THROW(entry(reinterpret_cast<const std::uint8_t*>(input.data()), input.size()));
 }
 
 // Overwrites, removes, repeats or inserts a few bytes; often with characters that mean something in the formats.
@@ -98,6 +102,55 @@ TEST_F(DamagedFiles, RandomBytesNeverCrashAnyReader) {
     for (char& c : bytes) c = static_cast<char>(random());
     if (i % 3 == kGlb && i % 2 == 0) bytes = "glTF" + bytes;
     run(static_cast<char>(i % 3), bytes);
+  }
+}
+
+// A glTF scene with all that the reader knows; its images are `image`.
+std::string gltf_scene(const std::string& image) {
+  testing::GltfScene scene;
+  scene.nodes = R"([{"mesh":0,"children":[1,2,3]},{"mesh":0,"scale":[1,2,-1]},
+      {"camera":0,"extensions":{"KHR_lights_punctual":{"light":0}}},{"extensions":{"KHR_lights_punctual":{"light":1}}}])";
+  scene.materials = R"([{"name":"m","alphaMode":"MASK","emissiveFactor":[1,1,0],"emissiveTexture":{"index":1},
+      "extensions":{"KHR_materials_ior":{"ior":1.4},"KHR_materials_emissive_strength":{"emissiveStrength":5}},
+      "pbrMetallicRoughness":{"baseColorFactor":[1,0.5,0.2,1],"metallicFactor":0.5,"roughnessFactor":0.7,
+      "baseColorTexture":{"index":0,"texCoord":1,"extensions":{"KHR_texture_transform":{"offset":[1,2],"rotation":1,"scale":[3,4]}}},
+      "metallicRoughnessTexture":{"index":0,"texCoord":1,"extensions":{"KHR_texture_transform":{"offset":[1,2],"rotation":1,"scale":[3,4]}}}}}])";
+  scene.extra =
+      R"("extensionsUsed":["KHR_lights_punctual","VENDOR_x"],"extensions":{"KHR_lights_punctual":{"lights":[
+      {"type":"spot","intensity":3,"color":[1,1,0],"spot":{"innerConeAngle":0.1,"outerConeAngle":0.5}},{"type":"directional"}]}},
+      "cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}],
+      "textures":[{"source":0,"sampler":0},{"source":1}],"samplers":[{"wrapS":33648}],
+      "images":[{"uri":"image.png"},{"uri":"data:image/png;base64,)" +
+      testing::base64(image) + R"("}],)";
+  return scene.json();
+}
+
+TEST_F(DamagedFiles, NeverCrashTheReadersOfScenes) {
+  Image image(3, 2, {"R", "G", "B"});
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i) / 18.0F;
+  save_image((directory_ / "image.png").string(), image);
+  std::ifstream in(directory_ / "image.png", std::ios::binary);
+  const std::string png{std::istreambuf_iterator<char>(in), {}};
+  const std::string library =
+      "newmtl m\nKd 0.1 0.2 0.3\nKs 1\nNs 20\nNi 1.5\nillum 3\nKe 1 2 3\nmap_Kd -s 1 2 -o 3 -clamp on "
+      "image.png\n"
+      "map_Ke image.png\nd 0.5\n";
+  const std::string gltf = gltf_scene(png);
+  const std::string obj = "mtllib library.mtl\n" + obj_file();
+  // What is damaged has to be whole before.
+  const std::string whole = write("scene.gltf", gltf);
+  ASSERT_EQ(load_scene(whole).scene.textures.size(), 4U);
+  write("library.mtl", library);
+  ASSERT_EQ(load_scene(write("scene.obj", obj)).scene.textures.size(), 2U);
+
+  std::mt19937 random(5);
+  const auto join = [](const std::string& scene, const std::string& mtl, const std::string& bytes) {
+    return scene + "\n%%library%%\n" + mtl + "\n%%image%%\n" + bytes;
+  };
+  for (int i = 0; i < 1200; ++i) {
+    run(kGltf, join(i % 4 == 0 ? gltf : damaged(gltf, random), "", i % 4 == 0 ? damaged(png, random) : png),
+        fuzz_load_scene);
+    run(kObj, join(i % 4 == 1 ? damaged(obj, random) : obj, damaged(library, random), png), fuzz_load_scene);
   }
 }
 

@@ -38,6 +38,24 @@ struct SaveReport {
 /// missing, not an image, truncated or beyond `limits`.
 Image load_image(const std::string& path, const ImageLimits& limits = {});
 
+/// Whether integers are decoded from sRGB: as load_image does, always (floats too), or never.
+enum class Transfer { automatic, srgb, linear };
+
+/// What becomes of an alpha channel: the colour is multiplied by it, as load_image does, or it is dropped and the
+/// colour left as it is stored.
+enum class AlphaUse { multiply, drop };
+
+struct DecodeOptions {
+  ImageLimits limits;
+  Transfer transfer = Transfer::automatic;
+  AlphaUse alpha = AlphaUse::multiply;
+};
+
+/// Decodes an image file that is in memory; `name` stands for its path in errors. As load_image, and FileError also if
+/// the image claims to be larger than its format can compress into so few bytes (all but EXR have such a bound).
+Image decode_image(const std::string& name, std::span<const unsigned char> bytes,
+                   const DecodeOptions& options = {});
+
 /// Writes atomically: a temporary file beside `path`, renamed when it is complete. The extension decides the
 /// format. EXR and TIFF hold any channels; PNG one to four, of which an even number must end with "A"; JPEG
 /// one or three; HDR three. Integer formats are encoded to sRGB after clipping to [0,1], alpha unassociated.

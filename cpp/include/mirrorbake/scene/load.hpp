@@ -2,10 +2,15 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
 
 #include "mirrorbake/scene/scene.hpp"
 
-/// Meshes from files (OBJ through tinyobjloader, glTF 2.0 through tinygltf, both behind this header).
+/// Meshes and scenes from files (OBJ, glTF 2.0 through tinygltf; their parsers stay behind this header). Files are
+/// hostile until read: what the functions take is bounded by the sizes of the files and the limits given, and
+/// they refer to nothing outside the file's own directory.
 namespace mirrorbake {
 
 struct MeshLimits {
@@ -20,5 +25,43 @@ struct MeshLimits {
 /// vertices or normals, indices or offsets out of range, or no triangle with an area. The memory it takes is bounded
 /// by the sizes of the files and `limits`.
 TriangleMesh load_mesh(const std::string& path, const MeshLimits& limits = {});
+
+struct SceneOptions {
+  MeshLimits meshes;  ///< of all objects together
+  int max_texture_side = 16384;
+  std::uint64_t max_texture_bytes = std::uint64_t{4} << 30;  ///< of all decoded textures together
+  /// glTF measures light in candela, lux and nits. Its numbers are divided by this many lumens per watt: 1 takes them as
+  /// they are, 683 gives watts of green light, as Blender's exporter assumes.
+  float luminous_efficacy = 1.0F;
+};
+
+/// A viewpoint that a scene file proposes.
+struct SceneCamera {
+  std::string name;
+  glm::vec3 eye{0.0F};
+  glm::vec3 direction{0.0F, 0.0F, -1.0F};  ///< unit, of the view
+  glm::vec3 up{0.0F, 1.0F, 0.0F};          ///< unit, upright to `direction`
+  float vertical_fov_degrees = 40.0F;
+};
+
+/// Something in a file that the scene does not show, and how often it occurs.
+struct SceneWarning {
+  std::string message;
+  std::uint64_t count = 1;
+};
+
+struct LoadedScene {
+  Scene scene;
+  std::vector<SceneCamera> cameras;
+  std::vector<SceneWarning> warnings;  ///< in the order of their first occurrence
+};
+
+/// Reads an .obj (with its .mtl), .gltf or .glb file. There is one object per glTF node or OBJ object and material,
+/// with the node's or object's name; "/" and the material's follow where it has several, and "#2" where a name repeats.
+/// docs/reference/scene-files.md has the whole mapping of materials and lights. The result passes
+/// validate(). Throws FileError as load_mesh does, and for material and light parameters that are not finite or out of
+/// range, images that are missing, corrupt or larger than the options allow; InvalidArgument for options out
+/// of range.
+LoadedScene load_scene(const std::string& path, const SceneOptions& options = {});
 
 }  // namespace mirrorbake

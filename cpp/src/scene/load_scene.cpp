@@ -1,0 +1,35 @@
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/scene/load.hpp"
+#include "scene_builder.hpp"
+
+namespace mirrorbake {
+namespace {
+
+void check_options(const SceneOptions& options) {
+  if (options.max_texture_side < 1 || options.max_texture_side > 65536) {
+    throw InvalidArgument("max_texture_side", std::to_string(options.max_texture_side), "1 to 65536");
+  }
+  if (!(options.luminous_efficacy >= 1e-6F && options.luminous_efficacy <= 1e6F)) {
+    throw InvalidArgument("luminous_efficacy", std::to_string(options.luminous_efficacy), "1e-6 to 1e6");
+  }
+}
+
+}  // namespace
+
+LoadedScene load_scene(const std::string& path, const SceneOptions& options) {
+  check_options(options);
+  const std::string extension = lower_extension(path);
+  const bool is_gltf = extension == ".gltf" || extension == ".glb";
+  if (!is_gltf && extension != ".obj") {
+    throw FileError(path, "has the extension '" + extension + "', expected .obj, .gltf or .glb");
+  }
+  LoadedScene loaded = is_gltf ? read_gltf_scene(path, options) : read_obj_scene(path, options);
+  try {
+    validate(loaded.scene);
+  } catch (const InvalidArgument& error) {
+    throw FileError(path, error.what());
+  }
+  return loaded;
+}
+
+}  // namespace mirrorbake

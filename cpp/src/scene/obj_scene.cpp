@@ -1,0 +1,152 @@
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "file_bytes.hpp"
+#include "loaded_mesh.hpp"
+#include "mirrorbake/core/error.hpp"
+#include "mtl.hpp"
+#include "scene_builder.hpp"
+
+namespace mirrorbake {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ObjScene {
+ public:
+  ObjScene(const std::string& path, const SceneOptions& options)
+      : path_(path), options_(options), textures_(options, warnings_) {}
+
+  LoadedScene read() {
+    ObjMaterials used;
+    LoadedMesh mesh = read_obj(path_, options_.meshes, &used);
+    drop_degenerate(path_, mesh);
+    for (const std::string& library : used.libraries) read_library(library);
+
+    std::map<int, int> material_of;
+    for (const MeshGroup& group : mesh.groups) {
+      if (material_of.contains(group.material)) continue;
+      material_of[group.material] = static_cast<int>(loaded_.scene.materials.size());
+      loaded_.scene.materials.push_back(
+          group.material < 0 ? unnamed() : material(used.names[static_cast<std::size_t>(group.material)]));
+    }
+    loaded_.scene.objects = split_into_objects(std::move(mesh), loaded_.scene.materials, material_of);
+    loaded_.warnings = warnings_.take();
+    return std::move(loaded_);
+  }
+
+ private:
+  struct Defined {
+    mtl::Definition definition;
+    fs::path library;
+  };
+
+  static Material unnamed() {
+    Material material;
+    material.name = "default";
+    return material;
+  }
+
+  fs::path resolved(const fs::path& from, const std::string& reference) const {
+    const auto target = resolve_inside(from.parent_path(), reference);
+    if (!target) {
+      throw FileError(from.string(),
+                      "refers to '" + reference + "', which is not inside the file's own directory");
+    }
+    return *target;
+  }
+
+  void read_library(const std::string& names) {
+    // One file whose name has spaces, or several files.
+    std::vector<std::string> files{names};
+    std::error_code code;
+    if (const auto whole = resolve_inside(fs::path(path_).parent_path(), names);
+        !whole || !fs::exists(*whole, code)) {
+      files.clear();
+      std::string_view left = names;
+      while (!left.empty()) {
+        const auto [file, rest] = mtl::split_keyword(left);
+        files.emplace_back(file);
+        left = rest;
+      }
+    }
+    for (const std::string& file : files) {
+      const fs::path library = resolved(path_, file);
+      if (!fs::exists(library, code)) {
+        warnings_.add("the material library '" + file + "' does not exist");
+        continue;
+      }
+      if (!libraries_.insert(library).second) continue;
+      const std::string text = read_file(library);
+      for (mtl::Definition& definition : mtl::parse(library.string(), text, warnings_)) {
+        const std::string name = definition.name;
+        definitions_.emplace(name, Defined{std::move(definition), library});
+      }
+    }
+  }
+
+  Material material(const std::string& name) {
+    const auto it = definitions_.find(name);
+    if (it == definitions_.end()) {
+      warnings_.add("the material '" + name + "' is not defined");
+      Material material = unnamed();
+      material.name = name;
+      return material;
+    }
+    const mtl::Definition& definition = it->second.definition;
+    const fs::path& library = it->second.library;
+    Material material = mtl::material_from(library.string(), definition, warnings_);
+    add_map(library, definition.diffuse_map, material.albedo_texture);
+    if (material.specular && material.fresnel.model != FresnelModel::dielectric) {
+      add_map(library, definition.specular_map, material.specular_texture);
+    }
+    float largest = 1.0F;
+    add_map(library, definition.emission_map, material.emission_texture, &largest);
+    material.emission *= largest;
+    return material;
+  }
+
+  void add_map(const fs::path& library, const mtl::Map& map, TextureReference& reference,
+               float* largest = nullptr) {
+    if (map.file.empty()) return;
+    const fs::path file = resolved(library, map.file);
+    const auto key = std::tuple(file, map.wrap, largest != nullptr);
+    const auto it = texture_of_.find(key);
+    if (it != texture_of_.end()) {
+      reference.texture = it->second.first;
+      if (largest != nullptr) *largest = it->second.second;
+      return;
+    }
+    const std::string bytes = read_file(file);
+    float factor = 1.0F;
+    Image image =
+        textures_.read(file.string(), {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()},
+                       Transfer::automatic, largest != nullptr ? &factor : nullptr);
+    if (largest != nullptr) *largest = factor;
+    reference.texture = static_cast<int>(loaded_.scene.textures.size());
+    loaded_.scene.textures.push_back({std::move(image), map.wrap, map.wrap});
+    texture_of_.emplace(key, std::pair(reference.texture, factor));
+  }
+
+  const std::string& path_;
+  const SceneOptions& options_;
+  Warnings warnings_;
+  TextureReader textures_;
+  LoadedScene loaded_;
+  std::set<fs::path> libraries_;
+  std::map<std::string, Defined> definitions_;
+  std::map<std::tuple<fs::path, TextureWrap, bool>, std::pair<int, float>> texture_of_;
+};
+
+}  // namespace
+
+LoadedScene read_obj_scene(const std::string& path, const SceneOptions& options) {
+  return ObjScene(path, options).read();
+}
+
+}  // namespace mirrorbake

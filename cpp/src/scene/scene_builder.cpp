@@ -1,0 +1,163 @@
+#include "scene_builder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "mirrorbake/core/error.hpp"
+
+namespace mirrorbake {
+namespace {
+
+std::string text(glm::vec3 v) {
+  return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
+}
+
+std::string unique_name(const std::string& wanted, std::map<std::string, int>& taken) {
+  int& count = taken[wanted];
+  if (++count == 1) return wanted;
+  for (;; ++count) {
+    const std::string name = wanted + "#" + std::to_string(count);
+    if (taken.emplace(name, 1).second) return name;
+  }
+}
+
+// Triangles [first, end) of the mesh.
+using Range = std::pair<std::size_t, std::size_t>;
+
+// The mesh of some triangles; `new_index` has an entry kUnused for every vertex, and has so again afterwards.
+constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+
+TriangleMesh submesh(const TriangleMesh& mesh, const std::vector<Range>& ranges,
+                     std::vector<std::uint32_t>& new_index) {
+  TriangleMesh result;
+  std::vector<std::uint32_t> used;
+  for (const auto& [first, end] : ranges) {
+    for (std::size_t i = first; i < end; ++i) {
+      glm::uvec3 t = mesh.triangles[i];
+      for (int k = 0; k < 3; ++k) {
+        std::uint32_t& index = new_index[t[k]];
+        if (index == kUnused) {
+          index = static_cast<std::uint32_t>(used.size());
+          used.push_back(t[k]);
+        }
+        t[k] = index;
+      }
+      result.triangles.push_back(t);
+    }
+  }
+  for (const std::uint32_t vertex : used) {
+    result.positions.push_back(mesh.positions[vertex]);
+    if (!mesh.normals.empty()) result.normals.push_back(mesh.normals[vertex]);
+    if (!mesh.uvs.empty()) result.uvs.push_back(mesh.uvs[vertex]);
+    new_index[vertex] = kUnused;
+  }
+  return result;
+}
+
+}  // namespace
+
+void Warnings::add(const std::string& message) {
+  const auto [it, is_new] = index_.emplace(message, warnings_.size());
+  if (is_new) {
+    warnings_.push_back({message, 1});
+  } else {
+    ++warnings_[it->second].count;
+  }
+}
+
+void TextureReader::reserve(const std::string& name, int width, int height, int channels) {
+  const std::uint64_t size = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
+                             static_cast<std::uint64_t>(channels) * sizeof(float);
+  if (size > options_.max_texture_bytes - bytes_) {
+    throw FileError(name, "is beyond the limit on decoded textures of " +
+                              std::to_string(options_.max_texture_bytes >> 20) + " MiB together");
+  }
+  bytes_ += size;
+}
+
+Image TextureReader::read(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
+                          float* largest) {
+  DecodeOptions decode;
+  decode.limits = {options_.max_texture_side, 4, options_.max_texture_bytes - bytes_};
+  decode.transfer = transfer;
+  decode.alpha = AlphaUse::drop;
+  Image image = decode_image(name, bytes, decode);
+  if (image.channels.size() != 1 && image.channels.size() != 3) {
+    throw FileError(name,
+                    "has " + std::to_string(image.channels.size()) + " channels, expected grey or R, G, B");
+  }
+  reserve(name, image.width, image.height, image.channel_count());
+  float most = 1.0F;
+  for (const float v : image.pixels) {
+    if (!(v >= 0.0F) || !std::isfinite(v)) {
+      throw FileError(name, "has the value " + std::to_string(v) + ", expected finite ones of at least 0");
+    }
+    most = std::max(most, v);
+  }
+  if (most > 1.0F) {
+    if (largest == nullptr) warnings_.add(name + ": values above 1 are taken as 1");
+    for (float& v : image.pixels) v = largest != nullptr ? v / most : std::min(v, 1.0F);
+  }
+  if (largest != nullptr) *largest = most;
+  return image;
+}
+
+glm::vec3 radiance(const std::string& path, const std::string& what, glm::vec3 value) {
+  for (int i = 0; i < 3; ++i) {
+    if (!(value[i] >= 0.0F) || !std::isfinite(value[i])) {
+      throw FileError(path, what + " is " + text(value) + ", expected finite values of at least 0");
+    }
+  }
+  return value;
+}
+
+glm::vec3 reflectance(const std::string& path, const std::string& what, glm::vec3 value, Warnings& warnings) {
+  radiance(path, what, value);
+  if (value.x <= 1.0F && value.y <= 1.0F && value.z <= 1.0F) return value;
+  warnings.add(what + ": values above 1 are taken as 1");
+  return {std::min(value.x, 1.0F), std::min(value.y, 1.0F), std::min(value.z, 1.0F)};
+}
+
+std::vector<Object> split_into_objects(LoadedMesh&& loaded, const std::vector<Material>& materials,
+                                       const std::map<int, int>& material_of) {
+  const LoadedMesh source = std::move(loaded);
+  struct Piece {
+    const MeshGroup* group;
+    std::vector<Range> ranges;
+  };
+  std::vector<Piece> pieces;
+  std::map<std::pair<int, int>, std::size_t> piece_of;
+  std::map<int, std::size_t> pieces_of_owner;
+  for (std::size_t i = 0; i < source.groups.size(); ++i) {
+    const MeshGroup& group = source.groups[i];
+    const std::size_t end =
+        i + 1 < source.groups.size() ? source.groups[i + 1].first_triangle : source.mesh.triangles.size();
+    if (end == group.first_triangle) continue;
+    const auto [it, is_new] = piece_of.emplace(std::pair(group.owner, group.material), pieces.size());
+    if (is_new) {
+      pieces.push_back({&group, {}});
+      ++pieces_of_owner[group.owner];
+    }
+    pieces[it->second].ranges.push_back({group.first_triangle, end});
+  }
+
+  std::vector<std::uint32_t> new_index(source.mesh.positions.size(), kUnused);
+  std::map<std::string, int> taken;
+  std::vector<Object> objects;
+  for (const Piece& piece : pieces) {
+    Object object;
+    object.material = material_of.at(piece.group->material);
+    std::string name = piece.group->name.empty() ? "object" : piece.group->name;
+    if (pieces_of_owner[piece.group->owner] > 1) {
+      name += "/" + materials[static_cast<std::size_t>(object.material)].name;
+    }
+    object.name = unique_name(name, taken);
+    object.mesh = submesh(source.mesh, piece.ranges, new_index);
+    objects.push_back(std::move(object));
+  }
+  return objects;
+}
+
+}  // namespace mirrorbake

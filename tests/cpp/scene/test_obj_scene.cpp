@@ -1,0 +1,161 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/image/image_io.hpp"
+#include "mirrorbake/scene/load.hpp"
+#include "temporary_files.hpp"
+
+namespace mirrorbake {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr const char* kTriangles =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    "o left\nusemtl red\nf 1/1 2/2 3/3\no right\nusemtl red\nf 1 3 4\nusemtl shiny\nf 1 4 2\n"
+    "o left\nf 2 3 4\n";
+
+class ObjSceneFile : public testing::FileTest {
+ protected:
+  LoadedScene load(const std::string& library, const std::string& triangles = kTriangles) const {
+    write("my scene.mtl", library);
+    return load_scene(write("scene.obj", "mtllib my scene.mtl\n" + triangles));
+  }
+  Material red(const std::string& definition) const {
+    return load("newmtl red\n" + definition + "\nnewmtl shiny\n").scene.materials.at(0);
+  }
+  void expect_error(const std::string& library, const std::string& message) const {
+    try {
+      load(library);
+      ADD_FAILURE() << "accepted: " << message;
+    } catch (const FileError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(message));
+    }
+  }
+};
+
+std::vector<std::string> messages(const LoadedScene& loaded) {
+  std::vector<std::string> result;
+  for (const SceneWarning& w : loaded.warnings) result.push_back(w.message + " x" + std::to_string(w.count));
+  return result;
+}
+
+TEST_F(ObjSceneFile, HasOneObjectPerNameAndMaterial) {
+  const LoadedScene loaded = load("newmtl red\nKd 1 0 0\nnewmtl shiny\nKd 0 0 1\n");
+  const Scene& scene = loaded.scene;
+  std::vector<std::pair<std::string, std::string>> found;
+  for (const Object& o : scene.objects) {
+    found.emplace_back(o.name, scene.materials.at(static_cast<std::size_t>(o.material)).name);
+  }
+  // The last face comes back to the object "left" with the material in force, shiny.
+  EXPECT_THAT(found, ElementsAre(std::pair("left/red", "red"), std::pair("right/red", "red"),
+                                 std::pair("right/shiny", "shiny"), std::pair("left/shiny", "shiny")));
+  EXPECT_EQ(scene.objects[0].mesh.triangles.size(), 1U);
+  EXPECT_EQ(scene.objects[0].mesh.uvs.at(1), glm::vec2(1, 0));
+  EXPECT_THAT(loaded.warnings, IsEmpty());
+}
+
+TEST_F(ObjSceneFile, KdIsLambertAndKsWithNsAPhongLobe) {
+  const Material m = red("Kd 0.5 0.25 0.125\nKs 0.3 0.2 0.1\nNs 96\nNi 1.5\nillum 2\nKe 1 2 3\nKa 9 9 9");
+  EXPECT_EQ(m.albedo, glm::vec3(0.5F, 0.25F, 0.125F));
+  EXPECT_TRUE(m.specular);
+  EXPECT_EQ(m.lobe, SpecularLobe::phong);
+  EXPECT_EQ(m.exponent, 96.0F);
+  EXPECT_EQ(m.fresnel.model, FresnelModel::constant);
+  EXPECT_EQ(m.fresnel.r0, glm::vec3(0.3F, 0.2F, 0.1F));
+  EXPECT_EQ(m.layers, LayerModel::additive);
+  EXPECT_EQ(m.emission, glm::vec3(1, 2, 3));
+  EXPECT_EQ(red("Ks 1\nNs 0").exponent, 1.0F);
+  EXPECT_EQ(red("Ks 1").fresnel.r0, glm::vec3(1.0F));
+  EXPECT_FALSE(red("Ks 1\nillum 1").specular);
+  EXPECT_FALSE(red("Ks 0 0 0\nNs 10").specular);
+  EXPECT_EQ(red("").albedo, glm::vec3(0.5F));
+}
+
+TEST_F(ObjSceneFile, IlluminationModels3And5AreMirrors) {
+  const Material constant = red("Ks 0.9\nNs 20\nillum 3");
+  EXPECT_EQ(constant.lobe, SpecularLobe::mirror);
+  EXPECT_EQ(constant.fresnel.model, FresnelModel::constant);
+  EXPECT_EQ(constant.fresnel.r0, glm::vec3(0.9F));
+  EXPECT_EQ(red("Ks 0.9\nillum 5").fresnel.model, FresnelModel::schlick);
+  const Material glass = red("Ks 0 0 0\nNi 1.33\nillum 5");
+  EXPECT_TRUE(glass.specular);
+  EXPECT_EQ(glass.lobe, SpecularLobe::mirror);
+  EXPECT_EQ(glass.fresnel.model, FresnelModel::dielectric);
+  EXPECT_EQ(glass.fresnel.eta, glm::vec3(1.33F));
+}
+
+TEST_F(ObjSceneFile, MapsAreReadWithTheirTransform) {
+  Image image(2, 1, {"R", "G", "B"});
+  image.pixels = {0.25F, 0.5F, 1.0F, 0.0F, 2.0F, 4.0F};
+  save_image((directory_ / "glow map.exr").string(), image, PixelFormat::float32);
+  image.pixels = {0.0F, 0.5F, 1.0F, 1.0F, 0.0F, 0.0F};
+  std::filesystem::create_directories(directory_ / "maps");
+  save_image((directory_ / "maps/colour.png").string(), image);
+  const LoadedScene loaded = load(
+      "newmtl red\nmap_Kd -s 2 3 1 -o 0.25 0.5 -blendu on maps\\colour.png\nKs 1\nmap_Ks -clamp on "
+      "maps/colour.png\n"
+      "Ke 1 1 1\nmap_Ke glow map.exr\nnewmtl shiny\nmap_Kd -s 4 maps/colour.png\n");
+  const Scene& scene = loaded.scene;
+  const Material& m = scene.materials.at(0);
+  EXPECT_EQ(m.albedo, glm::vec3(1.0F));
+  // u' = 2u + 0.25, v' = 3v + 0.5.
+  const glm::vec2 uv = texture_coordinates(m.albedo_texture, {0.3F, 0.1F});
+  EXPECT_NEAR(uv.x, 0.85, 1e-6);
+  EXPECT_NEAR(uv.y, 0.8, 1e-6);
+  EXPECT_NEAR(texture_lookup(scene, m.albedo_texture, {0.0F, 0.0F}).y, 0.5, 0.004);  // 8 bits
+  const Texture& specular = scene.textures.at(static_cast<std::size_t>(m.specular_texture.texture));
+  EXPECT_EQ(specular.wrap_u, TextureWrap::clamp);
+  // Textures are at most 1: the largest value goes to the factor.
+  EXPECT_EQ(m.emission, glm::vec3(4.0F));
+  EXPECT_EQ(m.emission * texture_lookup(scene, m.emission_texture, {0.75F, 0.5F}), glm::vec3(0, 2, 4));
+  // An image that is used in the same way is in memory once.
+  EXPECT_EQ(scene.materials.at(1).albedo_texture.texture, m.albedo_texture.texture);
+  EXPECT_EQ(scene.textures.size(), 3U);
+  EXPECT_THAT(loaded.warnings, IsEmpty());
+}
+
+TEST_F(ObjSceneFile, WhatIsLostIsCounted) {
+  const LoadedScene loaded =
+      load("newmtl red\nd 0.5\nmap_Bump bump.png\nKd 2 1 1\nnewmtl shiny\nTr 0.5\nillum 7\nKs 1\n");
+  EXPECT_THAT(
+      messages(loaded),
+      ElementsAre("MTL transparency (d, Tr) is not supported: opaque x2",
+                  "MTL keyword map_Bump is not supported x1",
+                  "material 'red' Kd: values above 1 are taken as 1 x1",
+                  "MTL illumination models with refraction (4, 6, 7, 9) are not supported: opaque x1"));
+  const LoadedScene bare = load_scene(write("bare.obj", std::string("mtllib gone.mtl\n") + kTriangles));
+  EXPECT_THAT(messages(bare),
+              ElementsAre("the material library 'gone.mtl' does not exist x1",
+                          "the material 'red' is not defined x1", "the material 'shiny' is not defined x1"));
+}
+
+TEST_F(ObjSceneFile, DefectsAreNamedWithTheirLine) {
+  write("text.png", "no image");
+  expect_error("Kd 1 1 1\n", "line 1: Kd '1 1 1', expected newmtl first");
+  expect_error("newmtl red\n\nKd 1 nan 1\n", "line 3: Kd '1 nan 1', expected one or three finite numbers");
+  expect_error("newmtl red\nKd 1 1\n", "line 2: Kd '1 1'");
+  expect_error("newmtl red\nKd spectral file.rfl\n", "line 2: Kd 'spectral file.rfl'");
+  expect_error("newmtl red\nKs -1 0 0\n", "line 2: Ks '-1 0 0'");
+  expect_error("newmtl red\nKe inf 0 0\n", "line 2: Ke 'inf 0 0'");
+  expect_error("newmtl red\nNs 1e99\n", "line 2: Ns '1e99', expected one finite number");
+  expect_error("newmtl red\nNi 0\n", "line 2: Ni '0', expected a refractive index above 0");
+  expect_error("newmtl red\nillum 99\n", "line 2: illum '99', expected 0 to 10");
+  expect_error("newmtl red\nmap_Kd\n", "expected the name of an image");
+  expect_error("newmtl red\nmap_Kd -s x a.png\n", "expected a number after -s");
+  expect_error("newmtl red\nmap_Kd gone.png\n", "gone.png: no such file");
+  expect_error("newmtl red\nmap_Kd text.png\n", "text.png: is not an EXR");
+  expect_error("newmtl red\nmap_Kd ../text.png\n", "refers to '../text.png', which is not inside");
+  expect_error("newmtl red\nmap_Kd /etc/passwd\n", "refers to '/etc/passwd', which is not inside");
+  EXPECT_THROW(load_scene(write("escape.obj", std::string("mtllib ../other.mtl\n") + kTriangles)), FileError);
+}
+
+}  // namespace
+}  // namespace mirrorbake

@@ -1,5 +1,6 @@
 """Scenes from Python: what goes in comes out, and what is wrong is named."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -166,16 +167,23 @@ def test_teapot_in_its_room_is_a_valid_scene() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mesh", "low", "high"),
+    ("make", "low", "high"),
     [
-        (_core.make_box((0, 0, 0), (1, 2, 3)), [0, 0, 0], [1, 2, 3]),
-        (_core.make_sphere((1, 1, 1), 0.5, segments=8), [0.5, 0.5, 0.5], [1.5, 1.5, 1.5]),
-        (_core.make_cylinder((0, 0, 0), 1.0, 2.0, segments=8), [-1, 0, -1], [1, 2, 1]),
-        (_core.make_cone((0, 0, 0), 1.0, 2.0, segments=8), [-1, 0, -1], [1, 2, 1]),
-        (_core.make_torus((0, 0, 0), 1.0, 0.25, segments=16), [-1.25, -0.25, -1.25], [1.25, 0.25, 1.25]),
-        (_core.make_rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), [0, 0, 0], [1, 1, 0]),
+        (lambda: _core.make_box((0, 0, 0), (1, 2, 3)), [0, 0, 0], [1, 2, 3]),
+        (lambda: _core.make_sphere((1, 1, 1), 0.5, segments=8), [0.5, 0.5, 0.5], [1.5, 1.5, 1.5]),
+        (lambda: _core.make_cylinder((0, 0, 0), 1.0, 2.0, segments=8), [-1, 0, -1], [1, 2, 1]),
+        (lambda: _core.make_cone((0, 0, 0), 1.0, 2.0, segments=8), [-1, 0, -1], [1, 2, 1]),
+        (
+            lambda: _core.make_torus((0, 0, 0), 1.0, 0.25, segments=16),
+            [-1.25, -0.25, -1.25],
+            [1.25, 0.25, 1.25],
+        ),
+        (lambda: _core.make_rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), [0, 0, 0], [1, 1, 0]),
     ],
 )
-def test_shapes_have_their_extent(mesh: _core.TriangleMesh, low: list[float], high: list[float]) -> None:
+def test_shapes_have_their_extent(
+    make: Callable[[], _core.TriangleMesh], low: list[float], high: list[float]
+) -> None:
+    mesh = make()
     assert np.allclose(_core.bounds(mesh), (low, high), atol=1e-6)
     assert mesh.normals.shape == mesh.positions.shape

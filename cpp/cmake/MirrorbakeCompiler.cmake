@@ -25,6 +25,10 @@ endif()
 if(MIRRORBAKE_WARNINGS_AS_ERRORS)
   target_compile_options(mirrorbake_build_flags INTERFACE -Werror)
 endif()
+if(MIRRORBAKE_BUILD_FUZZERS)
+  # libFuzzer is guided by what its inputs reach in the library.
+  target_compile_options(mirrorbake_build_flags INTERFACE -fsanitize=fuzzer-no-link)
+endif()
 if(MIRRORBAKE_SANITIZERS)
   target_compile_options(mirrorbake_build_flags INTERFACE
     -fsanitize=${MIRRORBAKE_SANITIZERS} -fno-omit-frame-pointer -fno-sanitize-recover=all)

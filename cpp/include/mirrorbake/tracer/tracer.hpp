@@ -109,6 +109,11 @@ class Tracer {
   /// undercut. What a tile has missed so far it cannot know of: rare bright paths are underestimated where it ends early.
   BeautyTrace trace_beauty_to_noise(const Camera& camera, float noise, const TraceOptions& options) const;
 
+  /// What the eye's rays meet first, channels `A` (coverage by objects), `Z` (depth along the view's axis in metres, +inf
+  /// where there is nothing), `normal.X` …, `position.X` …, `albedo.R` …, means over the covered samples, and `object`, the
+  /// number most samples have, −1 for none. By the same rays as trace_beauty with the same options.
+  Image trace_geometry(const Camera& camera, const TraceOptions& options) const;
+
   /// Layers of the object number `reflector`, whose material must be specular. Throws InvalidArgument for an eye inside
   /// it: in its bounding box, most directions meeting the back of its surface first.
   LayerTrace trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const;

@@ -1,0 +1,451 @@
+// mb-trace: path-traced images of a scene, and the segmented layers of its reflectors.
+//
+// Exit status: 0 done, 2 usage, 3 input that cannot be read or makes no sense, 4 a computation without an answer.
+
+#include <CLI/CLI.hpp>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/image/image_io.hpp"
+#include "mirrorbake/scene/load.hpp"
+#include "mirrorbake/scene/room.hpp"
+#include "mirrorbake/scene/shapes.hpp"
+#include "mirrorbake/shading/metals.hpp"
+#include "mirrorbake/tracer/tracer.hpp"
+
+namespace {
+
+using namespace mirrorbake;  // NOLINT(google-build-using-namespace): one program, one namespace
+
+std::string json_string(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    if (static_cast<unsigned char>(c) < 0x20) {
+      char code[8];
+      std::snprintf(code, sizeof code, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
+      result += code;
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
+// Whole numbers in `text`, separated by any of `separators`; nothing if it is anything else.
+std::optional<std::vector<int>> parse_numbers(const std::string& text, std::string_view separators) {
+  std::vector<int> numbers;
+  const char* place = text.data();
+  const char* const end = place + text.size();
+  while (true) {
+    int number = 0;
+    const auto [rest, error] = std::from_chars(place, end, number);
+    if (error != std::errc()) return std::nullopt;
+    numbers.push_back(number);
+    if (rest == end) return numbers;
+    if (separators.find(*rest) == std::string_view::npos) return std::nullopt;
+    place = rest + 1;
+  }
+}
+
+// A scene with the views that it proposes.
+struct Source {
+  Scene scene;
+  std::vector<std::pair<std::string, Camera>> cameras;
+};
+
+// The built-in room with a chromium teapot on its table.
+Source teapot_room() {
+  Source source{make_room(), {}};
+  Material chromium;
+  chromium.name = "chromium";
+  chromium.albedo = glm::vec3(0.0F);
+  chromium.specular = true;
+  chromium.fresnel = fit_metal(Metal::chromium).conductor;
+  source.scene.materials.push_back(chromium);
+  Object teapot;
+  teapot.name = "teapot";
+  teapot.mesh = make_teapot();
+  teapot.material = static_cast<int>(source.scene.materials.size()) - 1;
+  teapot.part_names = teapot_part_names();
+  source.scene.objects.push_back(std::move(teapot));
+  Camera camera;
+  camera.eye = {0.15F, 0.22F, 0.42F};
+  camera.target = {0.0F, 0.07F, 0.0F};
+  source.cameras.emplace_back("front", camera);
+  return source;
+}
+
+// Everything in view, a little from above.
+Camera framing(const Scene& scene) {
+  glm::vec3 low(std::numeric_limits<float>::max());
+  glm::vec3 high(std::numeric_limits<float>::lowest());
+  for (const Object& object : scene.objects) {
+    const Bounds box = bounds(object.mesh);
+    low = glm::min(low, box.min);
+    high = glm::max(high, box.max);
+  }
+  Camera camera;
+  camera.target = 0.5F * low + 0.5F * high;
+  const float radius = 0.5F * glm::length(high - low);
+  const float distance =
+      radius / std::sin(0.5F * camera.vertical_fov_degrees * std::numbers::pi_v<float> / 180.0F);
+  camera.eye = camera.target + distance * glm::normalize(glm::vec3(0.3F, 0.4F, 1.0F));
+  return camera;
+}
+
+// What every command takes.
+struct Request {
+  std::string path;
+  std::string output;
+  std::string indirect = "path";
+  std::string camera_name;
+  std::vector<float> eye, target;
+  std::optional<float> fov;
+  std::string size = "512x512";
+  std::string crop;
+  std::string format = "automatic";
+  int samples = 64;
+  int depth = 8;
+  std::uint64_t seed = 0;
+
+  void add_options(CLI::App& app) {
+    app.add_option("scene", path, "a .gltf, .glb or .obj file, or teapot-room")->required();
+    app.add_option("-o,--output", output, "image to write, .exr for its channels")->required();
+    app.add_option("--size", size, "pixels, WIDTHxHEIGHT")->capture_default_str();
+    app.add_option("--crop", crop, "the part of the image to trace, WIDTHxHEIGHT+X+Y in pixels");
+    app.add_option("--spp", samples, "samples per pixel, 1 to 65536")->capture_default_str();
+    app.add_option("--depth", depth, "bounces after the first, specular and diffuse, 0 to 64")
+        ->capture_default_str();
+    app.add_option("--seed", seed, "of the random numbers")->capture_default_str();
+    app.add_option("--indirect", indirect,
+                   "diffuse light by way of other surfaces: path (unbiased), cached (smooth) or none")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"path", "cached", "none"}));
+    app.add_option("--camera", camera_name, "a camera of the scene, by name (default: its first)");
+    app.add_option("--eye", eye, "x y z of the eye, metres")->type_size(3)->expected(1);
+    app.add_option("--target", target, "x y z of the point in the image's middle, metres")
+        ->type_size(3)
+        ->expected(1);
+    app.add_option("--fov", fov, "vertical field of view, degrees");
+    app.add_option("--format", format, "pixels in the file: automatic, half, float32, uint8, uint16")
+        ->capture_default_str();
+  }
+
+  Source load() const;
+
+  Camera camera(const Source& source) const {
+    Camera result;
+    const auto& cameras = source.cameras;
+    const auto named = std::find_if(cameras.begin(), cameras.end(),
+                                    [&](const auto& camera) { return camera.first == camera_name; });
+    if (!camera_name.empty() && named == cameras.end()) {
+      std::string names;
+      for (const auto& [name, unused] : cameras) names += (names.empty() ? "" : ", ") + name;
+      throw InvalidArgument("--camera", camera_name,
+                            names.empty() ? "no name: the scene has no cameras" : "one of " + names);
+    }
+    result = named != cameras.end() ? named->second
+             : cameras.empty()      ? framing(source.scene)
+                                    : cameras.front().second;
+    if (!eye.empty()) result.eye = {eye[0], eye[1], eye[2]};
+    if (!target.empty()) result.target = {target[0], target[1], target[2]};
+    if (fov) result.vertical_fov_degrees = *fov;
+    const auto pixels = parse_numbers(size, "x");
+    if (!pixels || pixels->size() != 2) throw InvalidArgument("--size", size, "WIDTHxHEIGHT in pixels");
+    result.width = (*pixels)[0];
+    result.height = (*pixels)[1];
+    return result;
+  }
+
+  TraceOptions trace_options() const {
+    TraceOptions options;
+    options.samples_per_pixel = samples;
+    options.max_specular_depth = options.max_diffuse_depth = depth;
+    options.seed = seed;
+    if (!crop.empty()) {
+      const auto numbers = parse_numbers(crop, "x+");
+      if (!numbers || numbers->size() != 4) {
+        throw InvalidArgument("--crop", crop, "WIDTHxHEIGHT+X+Y in pixels");
+      }
+      options.window = {(*numbers)[2], (*numbers)[3], (*numbers)[0], (*numbers)[1]};
+    }
+    // Only for someone who watches.
+    if (isatty(STDERR_FILENO) != 0) {
+      options.progress = [last = -1](double done) mutable {
+        const int percent = static_cast<int>(100.0 * done);
+        if (percent == last) return;
+        last = percent;
+        std::cerr << "\rmb-trace: " << percent << " %" << (percent == 100 ? "\n" : "") << std::flush;
+      };
+    }
+    return options;
+  }
+
+  Tracer tracer(Source source) const {
+    TracerOptions options;
+    options.indirect = indirect == "path"     ? IndirectLight::path
+                       : indirect == "cached" ? IndirectLight::cached
+                                              : IndirectLight::none;
+    options.seed = seed;
+    return Tracer(std::move(source.scene), options);
+  }
+
+  void save(const Image& image) const {
+    const SaveReport report = save_image(output, image, parse_pixel_format(format));
+    if (report.clamped_to_half + report.clipped > 0) {
+      std::cerr << "mb-trace: warning: " << output << ": " << report.clamped_to_half
+                << " values beyond 65504 clamped to float16, " << report.clipped
+                << " outside of the format clipped\n";
+    }
+  }
+};
+
+Source Request::load() const {
+  if (path == "teapot-room") return teapot_room();
+  // A mesh alone: a mirror under a white sky.
+  Source source;
+  Material mirror;
+  mirror.name = "mirror";
+  mirror.albedo = glm::vec3(0.0F);
+  mirror.specular = true;
+  mirror.fresnel.r0 = glm::vec3(0.9F);
+  source.scene.materials.push_back(mirror);
+  Object object;
+  object.name = "object";
+  object.mesh = load_mesh(path);
+  source.scene.objects.push_back(std::move(object));
+  source.scene.environment.emplace();
+  source.scene.environment->panorama = Image(8, 4, {"R", "G", "B"});
+  std::fill(source.scene.environment->panorama.pixels.begin(),
+            source.scene.environment->panorama.pixels.end(), 1.0F);
+  return source;
+}
+
+// The channels of several images of one size side by side, each image's with a prefix.
+Image merge(const std::vector<std::pair<std::string, const Image*>>& images) {
+  std::vector<std::string> names;
+  for (const auto& [prefix, image] : images) {
+    for (const std::string& channel : image->channels) names.push_back(prefix + channel);
+  }
+  Image merged(images.front().second->width, images.front().second->height, names);
+  for (int y = 0; y < merged.height; ++y) {
+    for (int x = 0; x < merged.width; ++x) {
+      float* out = merged.at(x, y);
+      for (const auto& [prefix, image] : images) {
+        out = std::copy_n(image->at(x, y), image->channels.size(), out);
+      }
+    }
+  }
+  return merged;
+}
+
+class Stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+struct Beauty {
+  Request request;
+  float noise = 0.0F;
+  bool aovs = false;
+
+  void run(bool json) const {
+    const Stopwatch watch;
+    Source source = request.load();
+    const Camera camera = request.camera(source);
+    const Tracer tracer = request.tracer(std::move(source));
+    const TraceOptions options = request.trace_options();
+    BeautyTrace trace;
+    if (noise > 0.0F) {
+      trace = tracer.trace_beauty_to_noise(camera, noise, options);
+    } else {
+      trace.image = tracer.trace_beauty(camera, options);
+      trace.mean_samples_per_pixel = options.samples_per_pixel;
+    }
+    if (aovs) {
+      const Image geometry = tracer.trace_geometry(camera, options);
+      request.save(merge({{"", &trace.image}, {"", &geometry}}));
+    } else {
+      request.save(trace.image);
+    }
+    if (noise > 0.0F && trace.share_above > 0.0) {
+      std::cerr << "mb-trace: warning: " << 100.0 * trace.share_above << " % of the tiles need more than "
+                << options.samples_per_pixel << " samples per pixel for a noise of " << noise << '\n';
+    }
+    if (!json) {
+      if (noise > 0.0F) {
+        std::cerr << "mb-trace: noise " << trace.noise << " after " << trace.mean_samples_per_pixel
+                  << " samples per pixel\n";
+      }
+      return;
+    }
+    std::cout << "{\"output\": " << json_string(request.output) << ", \"width\": " << trace.image.width
+              << ", \"height\": " << trace.image.height
+              << ", \"samples_per_pixel\": " << trace.mean_samples_per_pixel << ", \"noise\": ";
+    if (noise > 0.0F) {
+      std::cout << trace.noise << ", \"tiles_above_noise\": " << trace.share_above;
+    } else {
+      std::cout << "null";
+    }
+    std::cout << ", \"seconds\": " << watch.seconds() << "}\n";
+  }
+};
+
+struct Layers {
+  Request request;
+  std::vector<std::string> reflectors;
+
+  // Numbers of the objects that are asked for, by name; of all specular ones without names.
+  std::vector<int> objects(const Scene& scene) const {
+    std::vector<int> numbers;
+    std::string known;
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+      const Object& object = scene.objects[i];
+      if (!scene.materials[static_cast<std::size_t>(object.material)].specular) continue;
+      known += (known.empty() ? "" : ", ") + object.name;
+      if (reflectors.empty()) numbers.push_back(static_cast<int>(i));
+    }
+    for (const std::string& name : reflectors) {
+      const auto found = std::find_if(scene.objects.begin(), scene.objects.end(),
+                                      [&](const Object& object) { return object.name == name; });
+      if (found == scene.objects.end()) {
+        throw InvalidArgument("--reflector", name, "one of: " + known);
+      }
+      numbers.push_back(static_cast<int>(found - scene.objects.begin()));
+    }
+    if (numbers.empty()) throw InvalidArgument("scene", request.path, "an object with a specular material");
+    return numbers;
+  }
+
+  // Leaves one at least.
+  static void drop_unseen(std::vector<LayerTrace>& traces, std::vector<int>& numbers) {
+    for (std::size_t i = traces.size(); i-- > 0 && traces.size() > 1;) {
+      if (traces[i].samples.size() > 0) continue;
+      traces.erase(traces.begin() + static_cast<std::ptrdiff_t>(i));
+      numbers.erase(numbers.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+  }
+
+  void run(bool json) const {
+    const Stopwatch watch;
+    Source source = request.load();
+    const Camera camera = request.camera(source);
+    std::vector<int> numbers = objects(source.scene);
+    const Tracer tracer = request.tracer(std::move(source));
+    const TraceOptions options = request.trace_options();
+    std::vector<LayerTrace> traces = tracer.trace_layers(camera, numbers, options);
+    if (reflectors.empty()) drop_unseen(traces, numbers);
+
+    // All traces hold the same beauty image: it stands once, before the layers.
+    Image beauty(traces.front().layers.width, traces.front().layers.height, {"R", "G", "B"});
+    std::vector<Image> layers;
+    for (const LayerTrace& trace : traces) {
+      Image& image = layers.emplace_back(
+          beauty.width, beauty.height,
+          std::vector<std::string>(trace.layers.channels.begin() + 3, trace.layers.channels.end()));
+      for (int y = 0; y < beauty.height; ++y) {
+        for (int x = 0; x < beauty.width; ++x) {
+          const float* pixel = trace.layers.at(x, y);
+          std::copy_n(pixel, 3, beauty.at(x, y));
+          std::copy_n(pixel + 3, image.channels.size(), image.at(x, y));
+        }
+      }
+    }
+    std::vector<std::pair<std::string, const Image*>> parts{{"", &beauty}};
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      const std::string& name = tracer.scene().objects[static_cast<std::size_t>(numbers[i])].name;
+      parts.emplace_back(layers.size() == 1 ? "" : name + ".", &layers[i]);
+    }
+    request.save(merge(parts));
+    if (!json) return;
+    std::cout << "{\"output\": " << json_string(request.output) << ", \"width\": " << beauty.width
+              << ", \"height\": " << beauty.height << ", \"samples_per_pixel\": " << options.samples_per_pixel
+              << ", \"reflectors\": [";
+    for (std::size_t i = 0; i < traces.size(); ++i) {
+      const std::string& name = tracer.scene().objects[static_cast<std::size_t>(numbers[i])].name;
+      std::cout << (i ? ", " : "") << "{\"name\": " << json_string(name)
+                << ", \"samples\": " << traces[i].samples.size() << "}";
+    }
+    std::cout << "], \"seconds\": " << watch.seconds() << "}\n";
+  }
+};
+
+int run(int argc, char** argv) {
+  CLI::App app("Path-traced images of a scene, and the segmented layers of its reflectors.", "mb-trace");
+  app.set_version_flag("--version", "mb-trace " MIRRORBAKE_VERSION);
+  app.require_subcommand(1);
+  app.fallthrough();
+  int threads = 0;
+  bool json = false;
+  app.add_option("--threads", threads, "threads to use, 0 for all; the image does not depend on it")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_flag("--json", json, "print figures as JSON, one object per line");
+
+  Beauty beauty;
+  CLI::App* beauty_command = app.add_subcommand("beauty", "Radiance of everything: R, G, B");
+  beauty.request.add_options(*beauty_command);
+  beauty_command->add_option(
+      "--noise", beauty.noise,
+      "trace each tile until its relative standard error is this, in (0, 1]; --spp is then the "
+      "most it takes, at least 16");
+  beauty_command->add_flag("--aovs", beauty.aovs,
+                           "coverage A, depth Z, normal, position, albedo and object number as well");
+
+  Layers layers;
+  CLI::App* layers_command = app.add_subcommand(
+      "layers",
+      "Coverage, diffuse, Fresnel, local and distant incident radiance, and geometry of reflectors");
+  layers.request.add_options(*layers_command);
+  layers_command->add_option(
+      "--reflector", layers.reflectors,
+      "name of an object, may be given several times (default: all specular objects in view); with "
+      "several the channels start with the name");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const ThreadLimit limit(threads);
+  if (*beauty_command) beauty.run(json);
+  if (*layers_command) layers.run(json);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const NumericalError& error) {
+    std::cerr << "mb-trace: " << error.what() << '\n';
+    return 4;
+  } catch (const std::exception& error) {
+    std::cerr << "mb-trace: " << error.what() << '\n';
+    return 3;
+  }
+}

@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/sampling.hpp"
 
@@ -187,6 +188,45 @@ TEST(Resample, GivesTheSameBitsOnOneThreadAndOnTwo) {
     values[threads - 1] = resample(source, parse_projection("cube"), 77, 77).values;
   }
   EXPECT_EQ(values[0], values[1]);
+}
+
+TEST(Resample, EveryInstructionSetGivesTheSameBits) {
+  for (const char* from : {"latlong", "cube", "dual_paraboloid"}) {
+    const EnvMap source = make_map(from, 64, 64, lights);
+    for (const char* to : {"cube", "latlong", "dual_paraboloid"}) {
+      for (const int size : {20, 75}) {
+        std::vector<float> values;
+        {
+          const IsaLimit limit(Isa::baseline);
+          values = resample(source, parse_projection(to), size, size).values;
+        }
+        for (const Isa isa : {Isa::sse42, Isa::avx2, Isa::avx512}) {
+          const IsaLimit limit(isa);
+          ASSERT_EQ(resample(source, parse_projection(to), size, size).values, values)
+              << from << " to " << to << ", " << to_string(isa);
+        }
+      }
+    }
+  }
+}
+
+// The loops treat three channels, four to seven, and groups of seven differently.
+TEST(Resample, EveryChannelIsResampledAlike) {
+  const EnvMap one = make_map("latlong", 128, 64, lights);
+  for (const int channels : {2, 3, 4, 7, 9, 16}) {
+    EnvMap source = make_envmap({one.layout.projection, 128, 64, 1, channels});
+    for (std::size_t i = 0; i < source.values.size(); ++i) {
+      source.values[i] = one.values[i / static_cast<std::size_t>(channels)];
+    }
+    for (const int size : {12, 40}) {
+      const EnvMap expected = resample(one, parse_projection("cube"), size, size);
+      const EnvMap result = resample(source, parse_projection("cube"), size, size);
+      for (std::size_t i = 0; i < result.values.size(); ++i) {
+        ASSERT_EQ(result.values[i], expected.values[i / static_cast<std::size_t>(channels)])
+            << channels << " channels, cube of " << size;
+      }
+    }
+  }
 }
 
 TEST(Resample, ANaNTexelStaysWhereItIs) {

@@ -1,4 +1,3 @@
-#include <nanobind/operators.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -160,7 +159,7 @@ void bind_texture(nb::module_& m) {
       "A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of\n"
       "KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation` "
       "radians\n"
-      "about (0, 0), then moved. An int stands for the texture of that index.")
+      "about (0, 0), then moved.")
       .def(
           "__init__",
           [](TextureReference* self, int texture, glm::vec2 offset, glm::vec2 scale, float rotation) {
@@ -172,7 +171,13 @@ void bind_texture(nb::module_& m) {
       .def_rw("offset", &TextureReference::offset)
       .def_rw("scale", &TextureReference::scale)
       .def_rw("rotation", &TextureReference::rotation)
-      .def(nb::self == nb::self)
+      .def(
+          "__eq__",
+          [](const TextureReference& self, nb::handle other) {
+            return nb::isinstance<TextureReference>(other) &&
+                   self == nb::cast<const TextureReference&>(other);
+          },
+          nb::arg("other"))
       .def("__repr__", [](const TextureReference& r) {
         const auto pair = [](glm::vec2 v) {
           return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ")";
@@ -180,7 +185,6 @@ void bind_texture(nb::module_& m) {
         return "TextureReference(" + std::to_string(r.texture) + ", offset=" + pair(r.offset) +
                ", scale=" + pair(r.scale) + ", rotation=" + std::to_string(r.rotation) + ")";
       });
-  nb::implicitly_convertible<int, TextureReference>();
 }
 
 void bind_material(nb::module_& m) {
@@ -251,6 +255,43 @@ void bind_visibility(nb::module_& m) {
       .value("reflection", Visibility::reflection, "rays that leave a surface, specular or diffuse")
       .value("shadow", Visibility::shadow, "rays towards a light")
       .value("all", Visibility::all);
+}
+
+void bind_loaded_scene(nb::module_& m) {
+  nb::class_<SceneCamera>(m, "SceneCamera", "A viewpoint that a scene file proposes.")
+      .def_ro("name", &SceneCamera::name)
+      .def_ro("eye", &SceneCamera::eye)
+      .def_ro("direction", &SceneCamera::direction, "unit vector along the view")
+      .def_ro("up", &SceneCamera::up, "unit vector, upright to `direction`")
+      .def_ro("vertical_fov_degrees", &SceneCamera::vertical_fov_degrees)
+      .def("__repr__", [](const SceneCamera& camera) { return "SceneCamera('" + camera.name + "')"; });
+  nb::class_<SceneWarning>(m, "SceneWarning", "Something in a file that the scene does not show.")
+      .def_ro("message", &SceneWarning::message)
+      .def_ro("count", &SceneWarning::count, "how often it occurs")
+      .def("__repr__", [](const SceneWarning& w) {
+        return "SceneWarning('" + w.message + "', count=" + std::to_string(w.count) + ")";
+      });
+  nb::class_<LoadedScene>(m, "LoadedScene", "What a scene file holds.")
+      .def_ro("scene", &LoadedScene::scene)
+      .def_prop_ro("cameras", [](const LoadedScene& loaded) { return loaded.cameras; })
+      .def_prop_ro("warnings", [](const LoadedScene& loaded) { return loaded.warnings; });
+  m.def(
+      "load_scene",
+      [](const std::string& path, int max_texture_side, std::uint64_t max_texture_bytes,
+         std::uint64_t max_vertices, std::uint64_t max_triangles, float luminous_efficacy) {
+        return load_scene(
+            path, {{max_vertices, max_triangles}, max_texture_side, max_texture_bytes, luminous_efficacy});
+      },
+      nb::arg("path"), nb::kw_only(), nb::arg("max_texture_side") = SceneOptions{}.max_texture_side,
+      nb::arg("max_texture_bytes") = SceneOptions{}.max_texture_bytes,
+      nb::arg("max_vertices") = MeshLimits{}.max_vertices,
+      nb::arg("max_triangles") = MeshLimits{}.max_triangles, nb::arg("luminous_efficacy") = 1.0F,
+      nb::call_guard<nb::gil_scoped_release>(),
+      "Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,\n"
+      "materials, textures, lights and cameras. glTF's candela, lux and nits are divided by\n"
+      "`luminous_efficacy` (lumens per watt). Raises FileError if a file is missing, corrupt, beyond a limit "
+      "or\n"
+      "refers to files outside its directory.");
 }
 
 }  // namespace
@@ -354,6 +395,14 @@ void bind_scene(nb::module_& m) {
           [](const Scene& scene, int object) { return element(scene.objects, "object", object).material; },
           nb::arg("object"), "Index of an object's material.")
       .def(
+          "set_object_material",
+          [](Scene& scene, int object, int material) {
+            element(scene.objects, "object", object);
+            element(scene.materials, "material", material);
+            scene.objects[static_cast<std::size_t>(object)].material = material;
+          },
+          nb::arg("object"), nb::arg("material"), "Give an object the material of that index.")
+      .def(
           "object_part_names",
           [](const Scene& scene, int object) {
             const Object& o = element(scene.objects, "object", object);
@@ -393,6 +442,7 @@ void bind_scene(nb::module_& m) {
           "validate", [](const Scene& scene) { validate(scene); },
           "Raise InvalidArgument, naming the object and the field, if anything in the scene is unusable.");
 
+  bind_loaded_scene(m);
   m.def("make_room", &make_room, nb::call_guard<nb::gil_scoped_release>(),
         "The built-in furnished room. The table's top is the plane y = 0 with its centre at the origin; the "
         "reflector,\n"

@@ -380,7 +380,7 @@ class TextureReference:
     """
     A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of
     KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation` radians
-    about (0, 0), then moved. An int stands for the texture of that index.
+    about (0, 0), then moved.
     """
 
     def __init__(self, texture: int = -1, offset: Sequence[float] = (0.0, 0.0), scale: Sequence[float] = (1.0, 1.0), rotation: float = 0.0) -> None: ...
@@ -409,7 +409,7 @@ class TextureReference:
     @rotation.setter
     def rotation(self, arg: float, /) -> None: ...
 
-    def __eq__(self, arg: TextureReference, /) -> bool: ...
+    def __eq__(self, other: object) -> bool: ...
 
     def __repr__(self) -> str: ...
 
@@ -655,6 +655,9 @@ class Scene:
     def object_material(self, object: int) -> int:
         """Index of an object's material."""
 
+    def set_object_material(self, object: int, material: int) -> None:
+        """Give an object the material of that index."""
+
     def object_part_names(self, object: int) -> list[str]:
         """Names of an object's parts; its own if it has only one."""
 
@@ -677,6 +680,60 @@ class Scene:
         """
         Raise InvalidArgument, naming the object and the field, if anything in the scene is unusable.
         """
+
+class SceneCamera:
+    """A viewpoint that a scene file proposes."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def eye(self) -> Sequence[float]: ...
+
+    @property
+    def direction(self) -> Sequence[float]:
+        """unit vector along the view"""
+
+    @property
+    def up(self) -> Sequence[float]:
+        """unit vector, upright to `direction`"""
+
+    @property
+    def vertical_fov_degrees(self) -> float: ...
+
+    def __repr__(self) -> str: ...
+
+class SceneWarning:
+    """Something in a file that the scene does not show."""
+
+    @property
+    def message(self) -> str: ...
+
+    @property
+    def count(self) -> int:
+        """how often it occurs"""
+
+    def __repr__(self) -> str: ...
+
+class LoadedScene:
+    """What a scene file holds."""
+
+    @property
+    def scene(self) -> Scene: ...
+
+    @property
+    def cameras(self) -> list[SceneCamera]: ...
+
+    @property
+    def warnings(self) -> list[SceneWarning]: ...
+
+def load_scene(path: str, *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0) -> LoadedScene:
+    """
+    Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,
+    materials, textures, lights and cameras. glTF's candela, lux and nits are divided by
+    `luminous_efficacy` (lumens per watt). Raises FileError if a file is missing, corrupt, beyond a limit or
+    refers to files outside its directory.
+    """
 
 def make_room() -> Scene:
     """

@@ -127,7 +127,7 @@ def _create_store(stage: Stage, source: Source, directory: Path) -> PemStore:
     box = _fit_box(config, pilot.hits, origin, built)
     infinite = proxy_to_attributes(_core.Proxy.infinite(origin))
     use_box = config.maps.distant == "box" or (
-        config.maps.distant == "auto" and config.surroundings.room is not None
+        config.maps.distant == "auto" and config.surroundings.panorama is None
     )
     if use_box and box is None:
         raise InputError(
@@ -197,7 +197,7 @@ MIN_BOX_HITS = 100
 def _fit_box(
     config: SceneConfig, hits: FloatArray, origin: Sequence[float], built: BuiltScene
 ) -> dict[str, Any] | None:
-    if len(hits) < MIN_BOX_HITS or config.surroundings.room is None:
+    if len(hits) < MIN_BOX_HITS or config.surroundings.panorama is not None:
         return None
     if config.maps.box == "mean_distance":
         box = _core.fit_box_mean_distance(hits, origin, float(built.positions[:, 1].min()))

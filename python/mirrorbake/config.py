@@ -97,9 +97,12 @@ class Reflector(_Section):
     """[reflector]: the shiny object. It stands on y = 0, the table's top or the ground."""
 
     object: Literal["teapot"] | None = None
-    """A built-in object; or give `mesh`."""
+    """A built-in object; or give `mesh` or `scene_object`."""
     mesh: str | None = None
-    """An .obj, .gltf or .glb file; or give `object`."""
+    """An .obj, .gltf or .glb file; or give `object` or `scene_object`."""
+    scene_object: str | None = None
+    """Name of an object of `surroundings.scene`, which stays where it is; its material is the file's, unless
+    there is a section [material]."""
     height: Annotated[float, Field(gt=0, le=1e4)] = 0.15
     """The object is scaled to this height (the teapot: from its foot to the tip of the knob)."""
     scale: Annotated[float, Field(gt=0, le=1e6)] | None = None
@@ -116,8 +119,12 @@ class Reflector(_Section):
 
     @model_validator(mode="after")
     def _one_source(self) -> Reflector:
-        if (self.object is None) == (self.mesh is None):
-            raise ValueError("give either `object` or `mesh`")
+        if sum(source is not None for source in (self.object, self.mesh, self.scene_object)) != 1:
+            raise ValueError("give either `object`, `mesh` or `scene_object`")
+        if self.scene_object is not None:
+            for key, field in type(self).model_fields.items():
+                if key != "scene_object" and getattr(self, key) != field.default:
+                    raise ValueError(f"`{key}` has no meaning for `scene_object`, which stays as it is")
         if self.object is not None and self.scale is not None:
             raise ValueError("`scale` is for meshes; set the teapot's `height`")
         return self
@@ -179,9 +186,12 @@ class Surroundings(_Section):
     """[surroundings]: what the object mirrors."""
 
     room: Literal["furnished"] | None = None
-    """A built-in room; or give `panorama`."""
+    """A built-in room; or give `panorama` or `scene`."""
     panorama: str | None = None
-    """A latitude-longitude EXR or HDR image, its centre along -Z, +Y up; or give `room`."""
+    """A latitude-longitude EXR or HDR image, its centre along -Z, +Y up; or give `room` or `scene`. With
+    `scene` it is the light from around that."""
+    scene: str | None = None
+    """An .obj, .gltf or .glb file with objects, materials and lights; or give `room` or `panorama`."""
     rotation: float = 0.0
     """Of the panorama, counter-clockwise about +Y seen from above."""
     scale: Annotated[float, Field(gt=0, le=1e6)] = 1.0
@@ -190,10 +200,10 @@ class Surroundings(_Section):
 
     @model_validator(mode="after")
     def _one_source(self) -> Surroundings:
-        if (self.room is None) == (self.panorama is None):
-            raise ValueError("give either `room` or `panorama`")
-        if self.room is not None and self.ground is not None:
-            raise ValueError("`ground` is for panoramas: a room has its own table")
+        if (self.room is None) == (self.panorama is None and self.scene is None):
+            raise ValueError("give either `room`, `panorama` or `scene`")
+        if (self.room is not None or self.scene is not None) and self.ground is not None:
+            raise ValueError("`ground` is for panoramas alone: a room or a scene has its own floor")
         return self
 
 
@@ -284,7 +294,8 @@ class SceneConfig(_Section):
     """A whole scene file."""
 
     reflector: Reflector = Reflector(object="teapot")
-    material: MaterialConfig = MaterialConfig()
+    material: MaterialConfig | None = None
+    """Default: a scene object's own material, for other reflectors the section's defaults."""
     surroundings: Surroundings = Surroundings(room="furnished")
     views: Views = Views()
     layers: Layers = Layers()
@@ -292,8 +303,19 @@ class SceneConfig(_Section):
     trace: Trace = Trace()
     infer: Infer = Infer()
 
+    @model_validator(mode="after")
+    def _scene_object_has_a_scene(self) -> SceneConfig:
+        if self.reflector.scene_object is not None and self.surroundings.scene is None:
+            raise ValueError("reflector.scene_object needs surroundings.scene, the file that it is in")
+        return self
 
-PATH_KEYS = (("reflector", "mesh"), ("material", "texture"), ("surroundings", "panorama"))
+
+PATH_KEYS = (
+    ("reflector", "mesh"),
+    ("material", "texture"),
+    ("surroundings", "panorama"),
+    ("surroundings", "scene"),
+)
 """The keys whose values are files."""
 
 _EXPECTATIONS = {
@@ -409,14 +431,16 @@ def load_config(path: Path, overrides: Sequence[tuple[tuple[str, ...], Any]] = (
 
 # What a new value of a key makes meaningless.
 _ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
-    "reflector.mesh": ("object",),
-    "reflector.object": ("mesh",),
+    "reflector.mesh": ("object", "scene_object"),
+    "reflector.object": ("mesh", "scene_object"),
+    "reflector.scene_object": ("object", "mesh"),
     "material.fresnel": ("r0", "ior", "eta", "k", "metal"),
     "material.metal": ("eta", "k"),
     "material.eta": ("metal",),
     "material.k": ("metal",),
     "surroundings.panorama": ("room",),
-    "surroundings.room": ("panorama", "ground"),
+    "surroundings.scene": ("room", "ground"),
+    "surroundings.room": ("panorama", "scene", "ground"),
 }
 
 

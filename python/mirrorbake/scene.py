@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.config import ILLUMINANT, PATH_KEYS
+from mirrorbake.config import ILLUMINANT, PATH_KEYS, MaterialConfig
 from mirrorbake.errors import InputError
 from mirrorbake.files import sha256_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mirrorbake.config import MaterialConfig, Reflector, SceneConfig, Surroundings, Views
+    from mirrorbake.config import Reflector, SceneConfig, Surroundings, Views
     from mirrorbake.metrics import FloatArray
 
 DEFAULT_ELEVATION_DEGREES = 20.0
@@ -84,7 +84,7 @@ def hash_inputs(config: SceneConfig) -> dict[str, dict[str, str]]:
     """
     inputs = {}
     for section, key in PATH_KEYS:
-        path = getattr(getattr(config, section), key)
+        path = getattr(getattr(config, section), key, None)
         if path is not None:
             inputs[f"{section}.{key}"] = {"path": path, "sha256": sha256_of(Path(path))}
     return inputs
@@ -96,19 +96,22 @@ def build_scene(config: SceneConfig) -> BuiltScene:
     Raises
     ------
     InputError
-        A view lies inside the reflector.
+        A view lies inside the reflector, or the scene file has no such object, or a matte one.
     mirrorbake.FileError
-        A mesh or an image is missing or corrupt.
+        A mesh, a scene or an image is missing or corrupt.
     mirrorbake.InvalidArgument
         The scene is not usable: vertices that are not finite, no area.
     """
-    if config.surroundings.room is not None:
-        scene, notes = _core.make_room(), list[str]()
+    scene, notes = _surroundings(config.surroundings)
+    if config.reflector.scene_object is None:
+        mesh, part_names = _load_reflector(config.reflector)
+        reflector = scene.add_object(
+            REFLECTOR_NAME, mesh, _material(config.material or MaterialConfig(), scene), part_names
+        )
     else:
-        scene, notes = _panorama_scene(config.surroundings)
-    mesh, part_names = _load_reflector(config.reflector)
-    material = _material(config.material, scene)
-    reflector = scene.add_object(REFLECTOR_NAME, mesh, material, part_names)
+        reflector = _scene_reflector(config, scene)
+        mesh, part_names = scene.object_mesh(reflector), scene.object_part_names(reflector)
+    material = scene.material(scene.object_material(reflector))
     positions = np.asarray(mesh.positions)
     triangles = np.asarray(mesh.triangles)
     parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
@@ -126,7 +129,7 @@ def build_scene(config: SceneConfig) -> BuiltScene:
         triangles=triangles,
         parts=parts,
         part_names=part_names,
-        has_diffuse=any(config.material.albedo),
+        has_diffuse=any(material.albedo) or any(material.emission),
         arc=arc,
         notes=notes,
     )
@@ -256,7 +259,9 @@ def _material(config: MaterialConfig, scene: _core.Scene) -> int:
         _, _, eta, k, _ = _core.fit_metal(config.metal, ILLUMINANT)
     model = getattr(_core.FresnelModel, config.fresnel)
     fresnel = _core.Fresnel(model=model, r0=config.r0 or (0.9, 0.9, 0.9), eta=eta, k=k)
-    texture = -1 if config.texture is None else scene.add_texture(_load_rgb(config.texture))
+    texture = _core.TextureReference()
+    if config.texture is not None:
+        texture.texture = scene.add_texture(_load_rgb(config.texture))
     material = _core.Material(
         name=REFLECTOR_NAME,
         specular=True,
@@ -268,6 +273,23 @@ def _material(config: MaterialConfig, scene: _core.Scene) -> int:
     return scene.add_material(material)
 
 
+def _scene_reflector(config: SceneConfig, scene: _core.Scene) -> int:
+    name, names = config.reflector.scene_object, scene.object_names
+    if name not in names:
+        known = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
+        raise InputError(f"{config.surroundings.scene}: has no object {name!r}; its objects: {known}")
+    reflector = names.index(name)
+    if config.material is not None:
+        # Other objects may share the file's material.
+        scene.set_object_material(reflector, _material(config.material, scene))
+    elif not scene.material(scene.object_material(reflector)).specular:
+        raise InputError(
+            f"{config.surroundings.scene}: the material of {name!r} is matte; "
+            "a section [material] makes it shine"
+        )
+    return reflector
+
+
 def _load_rgb(path: str) -> FloatArray:
     pixels, channels = _core.load_image(path)
     if pixels.shape[2] == 1:
@@ -277,7 +299,20 @@ def _load_rgb(path: str) -> FloatArray:
     return np.ascontiguousarray(pixels[..., :3])
 
 
-def _panorama_scene(surroundings: Surroundings) -> tuple[_core.Scene, list[str]]:
+def _surroundings(surroundings: Surroundings) -> tuple[_core.Scene, list[str]]:
+    if surroundings.room is not None:
+        return _core.make_room(), []
+    scene, notes = _core.Scene(), list[str]()
+    if surroundings.scene is not None:
+        loaded = _core.load_scene(surroundings.scene)
+        scene = loaded.scene
+        notes = [f"{surroundings.scene}: {w.message} ({w.count} times)" for w in loaded.warnings]
+    if surroundings.panorama is not None:
+        notes += _add_panorama(scene, surroundings)
+    return scene, notes
+
+
+def _add_panorama(scene: _core.Scene, surroundings: Surroundings) -> list[str]:
     assert surroundings.panorama is not None
     panorama = _load_rgb(surroundings.panorama)
     bad = int(np.count_nonzero(~np.isfinite(panorama)))
@@ -289,7 +324,6 @@ def _panorama_scene(surroundings: Surroundings) -> tuple[_core.Scene, list[str]]
     if negative:
         notes.append(f"{surroundings.panorama}: {negative} negative values were taken as 0")
         panorama = np.maximum(panorama, np.float32(0.0))
-    scene = _core.Scene()
     scene.set_environment(panorama, surroundings.scale, surroundings.rotation)
     if surroundings.ground is not None:
         material = _core.Material(name="ground", albedo=surroundings.ground.albedo)
@@ -297,7 +331,7 @@ def _panorama_scene(surroundings: Surroundings) -> tuple[_core.Scene, list[str]]
             (0.0, -GROUND_THICKNESS, 0.0), surroundings.ground.radius, GROUND_THICKNESS, 96
         )
         scene.add_object("ground", disc, scene.add_material(material), [])
-    return scene, notes
+    return notes
 
 
 def _resolve_arc(views: Views, positions: FloatArray) -> Arc:

@@ -64,13 +64,13 @@ def test_scene_holds_what_is_added() -> None:
         _core.Material(
             name="gold",
             albedo=(0.1, 0.2, 0.3),
-            albedo_texture=texture,
+            albedo_texture=_core.TextureReference(texture),
             specular=True,
             fresnel=fresnel,
             specular_texture=_core.TextureReference(texture, scale=(2, 3), rotation=0.5),
             lobe=_core.SpecularLobe.ggx,
             roughness=0.25,
-            roughness_texture=texture,
+            roughness_texture=_core.TextureReference(texture),
             exponent=20.0,
             layers=_core.LayerModel.coated,
             emission=(0, 0, 1),
@@ -98,6 +98,8 @@ def test_scene_holds_what_is_added() -> None:
     np.testing.assert_allclose(back.fresnel.r0, (0.9, 0.8, 0.7), rtol=1e-7)
     assert back.layers == _core.LayerModel.coated
     assert back.albedo_texture == _core.TextureReference(texture)
+    assert back.albedo_texture != _core.TextureReference(texture, rotation=1.0)
+    assert back.albedo_texture != texture
     assert (back.specular_texture.scale, back.specular_texture.rotation) == ((2, 3), 0.5)
     assert (back.lobe, back.roughness, back.exponent) == (_core.SpecularLobe.ggx, 0.25, 20.0)
     assert back.roughness_texture.texture == texture

@@ -24,7 +24,11 @@ _mirrorbake_report(GLM glm_FOUND "${glm_VERSION}" 0.9.9 libglm-dev "vectors")
 find_package(TBB 2020 CONFIG QUIET)
 _mirrorbake_report(oneTBB TBB_FOUND "${TBB_VERSION}" 2020 libtbb-dev "threads")
 
-find_package(Eigen3 3.4 CONFIG QUIET)
+# Not by find_package's version: Eigen 5 says that it does not stand in for 3.
+find_package(Eigen3 CONFIG QUIET)
+if(Eigen3_FOUND AND Eigen3_VERSION VERSION_LESS 3.4)
+  set(Eigen3_FOUND FALSE)
+endif()
 _mirrorbake_report(Eigen Eigen3_FOUND "${Eigen3_VERSION}" 3.4 libeigen3-dev "small dense algebra")
 
 # Debian's Imath, which OpenImageIO pulls in, reports its missing Python parts in spite of QUIET.

@@ -111,11 +111,27 @@ Camera framing(const Scene& scene) {
   return camera;
 }
 
+bool is_dark(const Scene& scene) {
+  const bool glows =
+      std::any_of(scene.materials.begin(), scene.materials.end(),
+                  [](const Material& material) { return material.emission != glm::vec3(0.0F); });
+  return !glows && !scene.environment && scene.rectangle_lights.empty() && scene.sphere_lights.empty() &&
+         scene.point_lights.empty() && scene.directional_lights.empty() && scene.spot_lights.empty();
+}
+
+EnvironmentLight white_sky() {
+  EnvironmentLight sky;
+  sky.panorama = Image(8, 4, {"R", "G", "B"});
+  std::fill(sky.panorama.pixels.begin(), sky.panorama.pixels.end(), 1.0F);
+  return sky;
+}
+
 // What every command takes.
 struct Request {
   std::string path;
   std::string output;
   std::string indirect = "path";
+  std::string sky;
   std::string camera_name;
   std::vector<float> eye, target;
   std::optional<float> fov;
@@ -139,6 +155,8 @@ struct Request {
                    "diffuse light by way of other surfaces: path (unbiased), cached (smooth) or none")
         ->capture_default_str()
         ->check(CLI::IsMember({"path", "cached", "none"}));
+    app.add_option("--sky", sky,
+                   "panorama that lights the scene, latitude-longitude, instead of the scene's own");
     app.add_option("--camera", camera_name, "a camera of the scene, by name (default: its first)");
     app.add_option("--eye", eye, "x y z of the eye, metres")->type_size(3)->expected(1);
     app.add_option("--target", target, "x y z of the point in the image's middle, metres")
@@ -149,6 +167,7 @@ struct Request {
         ->capture_default_str();
   }
 
+  Source load_source() const;
   Source load() const;
 
   Camera camera(const Source& source) const {
@@ -219,23 +238,34 @@ struct Request {
 };
 
 Source Request::load() const {
+  Source source = load_source();
+  if (!sky.empty()) {
+    source.scene.environment.emplace();
+    source.scene.environment->panorama = load_image(sky);
+  } else if (is_dark(source.scene)) {
+    std::cerr << "mb-trace: warning: " << path << ": no lights; a white sky of radiance 1 is added\n";
+    source.scene.environment = white_sky();
+  }
+  return source;
+}
+
+Source Request::load_source() const {
   if (path == "teapot-room") return teapot_room();
-  // A mesh alone: a mirror under a white sky.
-  Source source;
-  Material mirror;
-  mirror.name = "mirror";
-  mirror.albedo = glm::vec3(0.0F);
-  mirror.specular = true;
-  mirror.fresnel.r0 = glm::vec3(0.9F);
-  source.scene.materials.push_back(mirror);
-  Object object;
-  object.name = "object";
-  object.mesh = load_mesh(path);
-  source.scene.objects.push_back(std::move(object));
-  source.scene.environment.emplace();
-  source.scene.environment->panorama = Image(8, 4, {"R", "G", "B"});
-  std::fill(source.scene.environment->panorama.pixels.begin(),
-            source.scene.environment->panorama.pixels.end(), 1.0F);
+  LoadedScene loaded = load_scene(path);
+  for (const SceneWarning& warning : loaded.warnings) {
+    std::cerr << "mb-trace: warning: " << path << ": " << warning.message;
+    if (warning.count > 1) std::cerr << " (" << warning.count << " times)";
+    std::cerr << '\n';
+  }
+  Source source{std::move(loaded.scene), {}};
+  for (const SceneCamera& camera : loaded.cameras) {
+    Camera view;
+    view.eye = camera.eye;
+    view.target = camera.eye + camera.direction;
+    view.up = camera.up;
+    view.vertical_fov_degrees = camera.vertical_fov_degrees;
+    source.cameras.emplace_back(camera.name, view);
+  }
   return source;
 }
 

@@ -112,6 +112,148 @@ TEST(Light, RectangleLightGivesItsFormFactor) {
   }
 }
 
+// A sphere above the horizon gives π L (r/d)² cosθ, whatever its size (Howell, B-18).
+TEST(Light, SphereLightGivesItsFormFactor) {
+  for (const float height : {1.1F, 3.0F, 200.0F}) {
+    Scene scene;
+    add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+    scene.sphere_lights.push_back({{0.5F, height, 0.0F}, 1.0F, glm::vec3(3.0F, 2.0F, 1.0F)});
+    const double d2 = 0.25 + static_cast<double>(height) * height;
+    const double expected = 3.0 / d2 * height / std::sqrt(d2);
+    for (IndirectLight mode : {IndirectLight::none, IndirectLight::path}) {
+      const Tracer tracer(scene, indirect(mode));
+      Camera camera = spot(glm::vec3(0.0F));
+      camera.eye = {-0.9F, 0.2F, -0.3F};
+      const Estimate got = estimate(tracer.trace_beauty(camera, {}));
+      EXPECT_NEAR(got.mean, expected, 4.0 * got.error + 1e-3 * expected) << "height " << height;
+      EXPECT_LT(got.error, 0.01 * expected);
+    }
+  }
+}
+
+TEST(Light, SphereLightIsVisibleFromOutsideOnly) {
+  Scene scene;
+  add_object(scene, floor_at(-5.0F), matte(glm::vec3(0.0F)));
+  scene.sphere_lights.push_back({{0.0F, 0.0F, 0.0F}, 1.0F, glm::vec3(4.0F)});
+  const Tracer tracer(scene, indirect(IndirectLight::none));
+  Camera camera;
+  camera.eye = {0, 0, 5};
+  camera.target = {0, 0, 0};
+  camera.vertical_fov_degrees = 5.0F;
+  camera.width = camera.height = 8;
+  EXPECT_EQ(estimate(tracer.trace_beauty(camera, {})).mean, 4.0);
+  camera.eye = {0, 0, 0.5F};
+  EXPECT_EQ(estimate(tracer.trace_beauty(camera, {})).mean, 0.0);
+}
+
+TEST(Light, DirectionalLightGivesItsIrradianceTimesTheCosine) {
+  Scene scene;
+  add_object(scene, floor_at(0.0F), matte(glm::vec3(0.8F)));
+  scene.directional_lights.push_back({glm::normalize(glm::vec3(0.0F, -4.0F, 3.0F)), glm::vec3(2.0F)});
+  const Tracer tracer(scene, indirect(IndirectLight::path));
+  const Estimate got = estimate(tracer.trace_beauty(spot(glm::vec3(0.0F)), {}));
+  EXPECT_NEAR(got.mean, 0.8 / kPi * 2.0 * 0.8, 1e-6);
+}
+
+TEST(Light, SpotLightFallsOffBetweenItsCones) {
+  Scene scene;
+  add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+  SpotLight light;
+  light.position = {0.0F, 2.0F, 0.0F};
+  light.intensity = glm::vec3(5.0F);
+  light.inner_degrees = 20.0F;
+  light.outer_degrees = 40.0F;
+  scene.spot_lights.push_back(light);
+  const Tracer tracer(scene, indirect(IndirectLight::none));
+  TraceOptions options;
+  options.samples_per_pixel = 1;
+  for (const float x : {0.0F, 0.5F, 1.2F, 2.0F}) {
+    const Estimate got = estimate(tracer.trace_beauty(spot({x, 0, 0}), options));
+    const double d2 = 4.0 + static_cast<double>(x) * x;
+    const double cosine = 2.0 / std::sqrt(d2);
+    const double low = std::cos(40.0 * kPi / 180.0);
+    const double ramp = std::clamp((cosine - low) / (std::cos(20.0 * kPi / 180.0) - low), 0.0, 1.0);
+    const double expected = 5.0 / kPi * cosine / d2 * ramp * ramp;
+    EXPECT_NEAR(got.mean, expected, 2e-3 * expected);  // the spot on the floor is 1e-4 m wide
+  }
+}
+
+// What an object is invisible to passes through it, and the two ways to find its light still add up.
+TEST(Light, VisibilitySetsHideObjectsFromKindsOfRays) {
+  const auto lit = [](Visibility visibility, IndirectLight mode, int more_objects) {
+    Scene scene;
+    add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+    Material glow = matte(glm::vec3(0.0F));
+    glow.emission = glm::vec3(3.0F);
+    const int lamp = add_object(scene, make_rectangle({0, 1.0F, 0}, {1, 0, 0}, {0, 0, 1.5F}), glow);
+    scene.objects[static_cast<std::size_t>(lamp)].visibility = visibility;
+    // More restricted objects than Embree's mask has bits.
+    for (int i = 0; i < more_objects; ++i) {
+      const int far = add_object(scene, make_sphere({100.0F, static_cast<float>(i), 0}, 0.1F, 8), glow);
+      scene.objects[static_cast<std::size_t>(far)].visibility = Visibility::camera;
+      scene.materials.back().emission = glm::vec3(0.0F);
+    }
+    const Tracer tracer(scene, indirect(mode));
+    Camera camera = spot(glm::vec3(0.0F));
+    camera.eye = {-0.4F, 0.2F, -0.3F};
+    return estimate(tracer.trace_beauty(camera, {}));
+  };
+  const double expected = 3.0 * corner_form_factor(1.0, 1.5, 1.0);
+  for (const int more : {0, 40}) {
+    for (const Visibility v :
+         {Visibility::all, Visibility::camera, Visibility::none, Visibility::reflection}) {
+      for (IndirectLight mode : {IndirectLight::none, IndirectLight::path}) {
+        const Estimate got = lit(v, mode, more);
+        EXPECT_NEAR(got.mean, expected, 4.0 * got.error + 1e-4 * expected) << static_cast<int>(v);
+      }
+    }
+  }
+  // A sheet between floor and light: only shadow rays decide what falls through it.
+  for (const Visibility v :
+       {Visibility::all, Visibility::camera | Visibility::reflection, Visibility::shadow}) {
+    Scene scene;
+    add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+    const int sheet = add_object(scene, floor_at(1.0F), matte(glm::vec3(0.25F)));
+    scene.objects[static_cast<std::size_t>(sheet)].visibility = v;
+    scene.point_lights.push_back({{0.0F, 2.0F, 0.0F}, glm::vec3(4.0F * std::numbers::pi_v<float>)});
+    const Tracer tracer(scene, indirect(IndirectLight::none));
+    Camera above = spot(glm::vec3(0.0F));
+    above.eye = {0.02F, 1.8F, 0.0F};
+    const bool seen = (v & Visibility::camera) != Visibility::none;
+    const bool blocks = (v & Visibility::shadow) != Visibility::none;
+    const double sheet_radiance = 0.25 * 4.0;  // at a distance of 1
+    const double floor_radiance = blocks ? 0.0 : 1.0;
+    EXPECT_NEAR(estimate(tracer.trace_beauty(above, {})).mean, seen ? sheet_radiance : floor_radiance, 2e-3);
+  }
+}
+
+TEST(Light, TexturesScaleEmissionReflectanceAndRoughness) {
+  Texture half;
+  half.image = Image(1, 1, {"Y"});
+  half.image.pixels = {0.5F};
+  const auto traced = [&](bool textured) {
+    Scene scene;
+    scene.textures.push_back(half);
+    const TextureReference reference{textured ? 0 : -1};
+    const float scale = textured ? 1.0F : 0.5F;
+    Material m = mirror(glm::vec3(0.8F * scale));
+    m.lobe = SpecularLobe::ggx;
+    m.roughness = 0.6F * scale;
+    m.specular_texture = m.roughness_texture = reference;
+    add_object(scene, floor_at(0.0F), m);
+    Material glow = matte(glm::vec3(0.0F));
+    glow.emission = glm::vec3(3.0F * scale);
+    glow.emission_texture = reference;
+    add_object(scene, make_rectangle({0, 1.0F, 0}, {1, 0, 0}, {0, 0, 1.5F}), glow);
+    Camera camera = spot(glm::vec3(0.0F));
+    camera.eye = {-0.4F, 0.2F, -0.3F};
+    return Tracer(scene, indirect(IndirectLight::path)).trace_beauty(camera, {}).pixels;
+  };
+  const std::vector<float> expected = traced(false);
+  EXPECT_GT(*std::max_element(expected.begin(), expected.end()), 0.01F);
+  EXPECT_EQ(traced(true), expected);
+}
+
 TEST(Light, RectangleLightIsOneSided) {
   Scene scene;
   add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));

@@ -10,7 +10,7 @@
 ///
 /// `ggx`: microfacets with normals after Trowbridge and Reitz, masked and shadowed by Smith's height-correlated term
 /// (Heitz, "Understanding the masking-shadowing function in microfacet-based BRDFs", JCGT 3(2), 2014). Light is
-/// reflected once: at α = 1 and normal incidence 0.43 of what a mirror reflects is lost to further bounces.
+/// reflected once: what the facets hide is lost, at normal incidence 1 % for α = 0.1 and ln 2 for α = 1.
 /// `phong`: (N+1)/(2π)·(r·l)^N per solid angle, the cosine to the surface's normal included; what falls below
 /// the horizon is lost. It is the filter of prefiltered Phong maps ([EMT] §3.2), and not reciprocal.
 namespace mirrorbake {

@@ -262,6 +262,33 @@ void bind_tracer(nb::module_& m) {
                "SurfaceSamples"),
            "Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.")
       .def(
+          "capture",
+          [](const Tracer& tracer, glm::vec3 origin, const std::string& projection, int width, int height,
+             const std::vector<int>& hidden, const TraceOptions& options) {
+            const Projection p = parse_projection(projection);
+            Image image;
+            {
+              nb::gil_scoped_release released;
+              image = tracer.capture(origin, p, width, height, hidden, options);
+            }
+            const auto faces = static_cast<std::size_t>(face_count(p));
+            const auto rows = static_cast<std::size_t>(height);
+            const auto columns = static_cast<std::size_t>(width);
+            return faces > 1 ? to_numpy(std::move(image.pixels), {faces, rows, columns, 3})
+                             : to_numpy(std::move(image.pixels), {rows, columns, 3});
+          },
+          nb::arg("origin"), nb::arg("projection"), nb::arg("width"), nb::arg("height"),
+          nb::arg("hidden") = std::vector<int>{}, nb::arg("options") = TraceOptions{},
+          nb::sig("def capture(self, origin: collections.abc.Sequence[float], projection: str, width: int, "
+                  "height: int, hidden: collections.abc.Sequence[int] = ..., options: TraceOptions = ...) -> "
+                  "NDArray[numpy.float32]"),
+          "The radiance that arrives at `origin` in any projection, (faces, height, width, 3) or, of one "
+          "face, "
+          "(height,\nwidth, 3): what EnvMap.from_array takes. The rays go straight through the texels of the "
+          "projection and pass\nthrough the objects in `hidden`, whose shadows and reflections on other "
+          "things "
+          "remain.")
+      .def(
           "capture_cube",
           [](const Tracer& tracer, glm::vec3 origin, int size, const std::vector<int>& hidden,
              const TraceOptions& options) {

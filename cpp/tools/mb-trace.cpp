@@ -1,4 +1,4 @@
-// mb-trace: path-traced images of a scene, and the segmented layers of its reflectors.
+// mb-trace: path-traced images of a scene, the segmented layers of its reflectors, and environment maps of it.
 //
 // Exit status: 0 done, 2 usage, 3 input that cannot be read or makes no sense, 4 a computation without an answer.
 
@@ -23,6 +23,7 @@
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/envmap/envmap_io.hpp"
 #include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/scene/load.hpp"
 #include "mirrorbake/scene/room.hpp"
@@ -227,8 +228,9 @@ struct Request {
     return Tracer(std::move(source.scene), options);
   }
 
-  void save(const Image& image) const {
-    const SaveReport report = save_image(output, image, parse_pixel_format(format));
+  void save(const Image& image) const { warn(save_image(output, image, parse_pixel_format(format))); }
+
+  void warn(const SaveReport& report) const {
     if (report.clamped_to_half + report.clipped > 0) {
       std::cerr << "mb-trace: warning: " << output << ": " << report.clamped_to_half
                 << " values beyond 65504 clamped to float16, " << report.clipped
@@ -423,8 +425,84 @@ struct Layers {
   }
 };
 
+struct Capture {
+  Request request;
+  std::string projection = "cube";
+  std::string layout = "automatic";
+  std::vector<float> origin;
+  std::vector<std::string> hidden;
+
+  void add_options(CLI::App& app) {
+    request.size = "256";
+    request.add_options(app);
+    app.get_option("--size")->description(
+        "texels of a face, HEIGHT or WIDTHxHEIGHT; a latlong is twice as wide as high");
+    for (const char* name : {"--crop", "--camera", "--eye", "--target", "--fov"}) {
+      app.remove_option(app.get_option(name));
+    }
+    app.add_option("--to", projection,
+                   "projection: cube, latlong, dual_paraboloid, sphere_map, angular, fisheye:DEGREES")
+        ->capture_default_str();
+    app.add_option("--origin", origin, "x y z of the point to look from, metres (default: 0 0 0)")
+        ->type_size(3)
+        ->expected(1);
+    app.add_option("--hide", hidden, "name of an object that rays pass through, may be given several times");
+    app.add_option("--layout", layout,
+                   "how faces share the image: strip, column, grid, cross, vertical_cross, files")
+        ->capture_default_str();
+  }
+
+  std::vector<int> hidden_objects(const Scene& scene) const {
+    std::vector<int> numbers;
+    for (const std::string& name : hidden) {
+      const auto found = std::find_if(scene.objects.begin(), scene.objects.end(),
+                                      [&](const Object& object) { return object.name == name; });
+      if (found == scene.objects.end()) {
+        std::string known;
+        for (const Object& object : scene.objects) known += (known.empty() ? "" : ", ") + object.name;
+        throw InvalidArgument("--hide", name, "one of: " + known);
+      }
+      numbers.push_back(static_cast<int>(found - scene.objects.begin()));
+    }
+    return numbers;
+  }
+
+  EnvMapLayout map_layout() const {
+    EnvMapLayout map;
+    map.projection = parse_projection(projection);
+    const auto sides = parse_numbers(request.size, "x");
+    if (!sides || sides->size() > 2) {
+      throw InvalidArgument("--size", request.size, "HEIGHT or WIDTHxHEIGHT in texels of a face");
+    }
+    map.height = sides->back();
+    map.width = sides->size() == 2 ? sides->front() : map.height * natural_aspect(map.projection);
+    validate(map);
+    return map;
+  }
+
+  void run(bool json) const {
+    const Stopwatch watch;
+    const EnvMapLayout map = map_layout();
+    const FaceLayout face_layout = parse_face_layout(layout);
+    const Tracer tracer = request.tracer(request.load());
+    const glm::vec3 from = origin.empty() ? glm::vec3(0.0F) : glm::vec3(origin[0], origin[1], origin[2]);
+    const Image image = tracer.capture(from, map.projection, map.width, map.height,
+                                       hidden_objects(tracer.scene()), request.trace_options());
+    const SaveReport report = save_envmap(request.output, EnvMapView{map, image.pixels, image.channels},
+                                          face_layout, parse_pixel_format(request.format));
+    request.warn(report);
+    if (!json) return;
+    std::cout << "{\"output\": " << json_string(request.output)
+              << ", \"projection\": " << json_string(to_string(map.projection))
+              << ", \"width\": " << map.width << ", \"height\": " << map.height
+              << ", \"samples_per_pixel\": " << request.samples << ", \"seconds\": " << watch.seconds()
+              << "}\n";
+  }
+};
+
 int run(int argc, char** argv) {
-  CLI::App app("Path-traced images of a scene, and the segmented layers of its reflectors.", "mb-trace");
+  CLI::App app("Path-traced images of a scene, layers of its reflectors, and environment maps of it.",
+               "mb-trace");
   app.set_version_flag("--version", "mb-trace " MIRRORBAKE_VERSION);
   app.require_subcommand(1);
   app.fallthrough();
@@ -455,6 +533,11 @@ int run(int argc, char** argv) {
       "name of an object, may be given several times (default: all specular objects in view); with "
       "several the channels start with the name");
 
+  Capture capture;
+  CLI::App* capture_command = app.add_subcommand(
+      "capture", "What arrives at a point from all sides, as an environment map of any projection");
+  capture.add_options(*capture_command);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -463,6 +546,7 @@ int run(int argc, char** argv) {
   const ThreadLimit limit(threads);
   if (*beauty_command) beauty.run(json);
   if (*layers_command) layers.run(json);
+  if (*capture_command) capture.run(json);
   return 0;
 }
 

@@ -1047,6 +1047,13 @@ class Tracer:
         Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.
         """
 
+    def capture(self, origin: Sequence[float], projection: str, width: int, height: int, hidden: Sequence[int] = ..., options: TraceOptions = ...) -> NDArray[numpy.float32]:
+        """
+        The radiance that arrives at `origin` in any projection, (faces, height, width, 3) or, of one face, (height,
+        width, 3): what EnvMap.from_array takes. The rays go straight through the texels of the projection and pass
+        through the objects in `hidden`, whose shadows and reflections on other things remain.
+        """
+
     def capture_cube(self, origin: Sequence[float], size: int, hidden: Sequence[int] = ..., options: TraceOptions = ...) -> NDArray[numpy.float32]:
         """
         Cube map (6, size, size, 3) of the radiance that arrives at `origin`, the rays passing through the objects

@@ -7,3 +7,4 @@
 /// else comes back, a crash, a sanitizer's report or a result that does not validate, is a finding.
 int fuzz_load_mesh(const std::uint8_t* data, std::size_t size);
 int fuzz_load_scene(const std::uint8_t* data, std::size_t size);
+int fuzz_load_envmap(const std::uint8_t* data, std::size_t size);

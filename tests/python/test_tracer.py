@@ -7,6 +7,7 @@ import pytest
 
 from mirrorbake import _core
 from mirrorbake._core import Camera, IndirectLight, TraceOptions, Tracer, TracerOptions
+from mirrorbake.envmap import EnvMap
 
 
 def scene_with_ring() -> tuple[_core.Scene, int]:
@@ -123,6 +124,18 @@ def test_capture_hides_objects(tracer: Tracer) -> None:
     assert (with_floor[3] != cube[3]).all()
     with pytest.raises(ValueError, match="hidden"):
         tracer.capture_cube((0, 1, 0), 8, [2], options)
+
+
+def test_capture_in_any_projection_is_what_an_envmap_takes(tracer: Tracer) -> None:
+    options = TraceOptions(samples_per_pixel=1)
+    for projection, shape in [("dual_paraboloid", (2, 8, 8, 3)), ("latlong", (8, 16, 3))]:
+        array = tracer.capture((0, 1, 0), projection, shape[-2], 8, [0, 1], options)
+        assert array.shape == shape
+        envmap = EnvMap.from_array(array, projection)
+        # The sky is all there is in front and behind, the light hangs above.
+        np.testing.assert_allclose(envmap.sample([[0, -1, 0.5], [0, -1, -0.5]]), 0.25, rtol=1e-6)
+    with pytest.raises(ValueError, match="projection"):
+        tracer.capture((0, 1, 0), "octahedron", 8, 8)
 
 
 def test_intersect_reports_distance_object_and_normal(tracer: Tracer) -> None:

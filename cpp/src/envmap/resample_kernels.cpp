@@ -143,7 +143,7 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
         (face >= 0) & (face == above_face[i + 1]) & (face == below_face[i]) & (face == below_face[i + 1]);
     const float share = shares[i];
     const int kind = share >= 1.0F ? +kInterpolate : share > 0.0F ? +kBlend : +kArea;
-    kinds[i] = static_cast<std::uint8_t>(together & (share >= 0.0F) ? kind : +kIrregular);
+    kinds[i] = static_cast<std::uint8_t>((together & (share >= 0.0F)) ? kind : +kIrregular);
     all |= kinds[i];
   }
   return all;

@@ -137,4 +137,19 @@ class BeautySums {
   std::vector<int> samples_;     ///< per tile
 };
 
+/// Beauty values along `ray_through(row, point)`, the rays passing through what `view` leaves out.
+template <typename RayThrough>
+Image trace_image(const World& world, const RayScene::View& view, int image_width, const PixelWindow& window,
+                  const TraceOptions& options, const RayThrough& ray_through) {
+  BeautySums sums(image_width, window);
+  ProgressCounter progress(options, sums.tile_count());
+  parallel_for(sums.tile_count(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t tile = begin; tile < end; ++tile) {
+      sums.trace(world, view, options, tile, options.samples_per_pixel, ray_through);
+      progress.step();
+    }
+  });
+  return sums.image();
+}
+
 }  // namespace mirrorbake::tracing

@@ -6,6 +6,9 @@ namespace mirrorbake::tracing {
 
 /// Throws InvalidArgument unless `value` is in [low, high].
 void check_range(const char* argument, int value, int low, int high);
+/// Throws InvalidArgument for a point that is not finite or too far away for Embree.
+void check_point(const char* argument, glm::vec3 point);
+
 void validate(const TraceOptions& options);
 /// The window of an image that the options mean. Throws InvalidArgument if it does not lie in the image.
 PixelWindow window_in(const TraceOptions& options, int width, int height);

@@ -14,7 +14,6 @@
 #include "integrator.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
-#include "mirrorbake/projection/cube.hpp"
 #include "options.hpp"
 #include "state.hpp"
 
@@ -47,21 +46,6 @@ const TracerOptions& validated(const TracerOptions& options) {
   tracing::check_range("cache_rays", options.cache_rays, 1, 65536);
   tracing::check_range("cache_bounces", options.cache_bounces, 1, 16);
   return options;
-}
-
-/// Beauty values along `ray_through(row, point)`, the rays passing through what `view` leaves out.
-template <typename RayThrough>
-Image trace_image(const tracing::World& world, const tracing::RayScene::View& view, int image_width,
-                  const PixelWindow& window, const TraceOptions& options, const RayThrough& ray_through) {
-  BeautySums sums(image_width, window);
-  tracing::ProgressCounter progress(options, sums.tile_count());
-  parallel_for(sums.tile_count(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t tile = begin; tile < end; ++tile) {
-      sums.trace(world, view, options, tile, options.samples_per_pixel, ray_through);
-      progress.step();
-    }
-  });
-  return sums.image();
 }
 
 void check_rays(std::span<const glm::vec3> origins, std::span<const glm::vec3> directions) {
@@ -143,6 +127,10 @@ void check_range(const char* argument, int value, int low, int high) {
   }
 }
 
+void check_point(const char* argument, glm::vec3 point) {
+  if (!usable(point)) throw InvalidArgument(argument, text(point), "finite coordinates up to 1e18");
+}
+
 void validate(const TraceOptions& options) {
   check_range("samples_per_pixel", options.samples_per_pixel, 1, 65536);
   check_range("max_specular_depth", options.max_specular_depth, 0, 64);
@@ -193,7 +181,7 @@ Image Tracer::trace_beauty(const Camera& camera, const TraceOptions& options) co
   const tracing::CameraRays rays(camera);
   const glm::vec3 eye = camera.eye - world.rays.origin();
   const auto ray_through = [&](int, glm::vec2 point) { return Ray{eye, rays.direction(point)}; };
-  return trace_image(world, world.rays.all(), camera.width,
+  return tracing::trace_image(world, world.rays.all(), camera.width,
                      tracing::window_in(options, camera.width, camera.height), options, ray_through);
 }
 
@@ -260,23 +248,6 @@ BeautyTrace Tracer::trace_beauty_to_noise(const Camera& camera, float noise,
   trace.mean_samples_per_pixel /= tiles;
   trace.share_above = static_cast<double>(open.size()) / tiles;
   return trace;
-}
-
-Image Tracer::capture_cube(glm::vec3 origin, int size, std::span<const int> hidden,
-                           const TraceOptions& options) const {
-  tracing::check_range("size", size, 1, 16384);
-  tracing::validate(options);
-  if (!usable(origin)) throw InvalidArgument("origin", text(origin), "finite coordinates up to 1e18");
-  const tracing::World& world = state_->world;
-  const tracing::RayScene::View view = world.rays.without(hidden);
-  const glm::vec3 eye = origin - world.rays.origin();
-  const auto ray_through = [&](int row, glm::vec2 point) {
-    // Rows count through all faces.
-    const int face = row / size;
-    const glm::vec2 place = (point - glm::vec2(0, face * size)) / static_cast<float>(size);
-    return Ray{eye, glm::normalize(direction_from_cube(face, place.x, place.y))};
-  };
-  return trace_image(world, view, size, {0, 0, size, 6 * size}, options, ray_through);
 }
 
 std::vector<RayHit> Tracer::intersect(std::span<const glm::vec3> origins,

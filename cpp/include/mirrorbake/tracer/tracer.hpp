@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "mirrorbake/image/image.hpp"
+#include "mirrorbake/projection/projection.hpp"
 #include "mirrorbake/scene/scene.hpp"
 #include "mirrorbake/tracer/camera.hpp"
 #include "mirrorbake/tracer/surface_samples.hpp"
@@ -127,9 +128,15 @@ class Tracer {
   /// trace_layers with the same options.
   SurfaceSamples trace_visibility(const Camera& camera, int reflector, const TraceOptions& options) const;
 
-  /// Cube map of the radiance that arrives at `origin`, by rays that pass through the objects in `hidden`. What the rays
-  /// show still bears those objects' shadows and reflections, as in the distant layer. Channels R, G, B, face after
-  /// face (+X −X +Y −Y +Z −Z) from top to bottom in one image of `size` × 6·`size`.
+  /// The radiance that arrives at `origin`, as an environment map (spec T2): rays straight through the texels of the
+  /// projection, which pass through the objects in `hidden`. What the rays show still bears those objects' shadows and
+  /// reflections, as in the distant layer. A texel is the mean over its area in the map; beyond the rim of round maps
+  /// the projection goes on, as in resample(). Channels R, G, B, faces of width × height texels one below the other in one
+  /// image, in the order of EnvMapLayout. Throws InvalidArgument for sides outside 1…16384, or a cube that is not square.
+  Image capture(glm::vec3 origin, const Projection& projection, int width, int height,
+                std::span<const int> hidden, const TraceOptions& options) const;
+
+  /// capture() as a cube map: one image of `size` × 6·`size`.
   Image capture_cube(glm::vec3 origin, int size, std::span<const int> hidden,
                      const TraceOptions& options) const;
 

@@ -1,0 +1,42 @@
+#include <string>
+#include <glm/geometric.hpp>
+
+#include "beauty.hpp"
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/tracer/tracer.hpp"
+#include "options.hpp"
+#include "state.hpp"
+
+namespace mirrorbake {
+
+Image Tracer::capture(glm::vec3 origin, const Projection& projection, int width, int height,
+                      std::span<const int> hidden, const TraceOptions& options) const {
+  validate(projection);
+  tracing::check_range("width", width, 1, 16384);
+  tracing::check_range("height", height, 1, 16384);
+  if (projection.kind == ProjectionKind::cube && width != height) {
+    throw InvalidArgument("height", std::to_string(height), "the width: the faces of a cube map are square");
+  }
+  tracing::validate(options);
+  tracing::check_point("origin", origin);
+  const tracing::World& world = state_->world;
+  const tracing::RayScene::View view = world.rays.without(hidden);
+  const glm::vec3 eye = origin - world.rays.origin();
+  const auto ray_through = [&](int row, glm::vec2 point) {
+    // Rows count through all faces.
+    const int face = row / height;
+    const double x = 2.0 * static_cast<double>(point.x) / width - 1.0;
+    const double y = 1.0 - 2.0 * (static_cast<double>(point.y) - static_cast<double>(face) * height) / height;
+    return tracing::Ray{eye, glm::vec3(direction_from_point(projection, face, x, y))};
+  };
+  const PixelWindow whole{0, 0, width, face_count(projection) * height};
+  return trace_image(world, view, width, whole, options, ray_through);
+}
+
+Image Tracer::capture_cube(glm::vec3 origin, int size, std::span<const int> hidden,
+                           const TraceOptions& options) const {
+  tracing::check_range("size", size, 1, 16384);
+  return capture(origin, Projection{ProjectionKind::cube}, size, size, hidden, options);
+}
+
+}  // namespace mirrorbake

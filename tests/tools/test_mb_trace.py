@@ -90,9 +90,8 @@ def test_beauty_writes_radiance_and_aovs(scene: Path, tmp_path: Path) -> None:
 
     floor = (at("object") == 0) & (at("A") == 1) & (at("albedo.R") == 0.5)
     assert floor.sum() > 20
-    # White sky of radiance 1; the mirror covers none of it with less than its reflectance.
-    assert (at("R")[floor] > 0.3).all()
-    assert (at("R")[floor] < 0.51).all()
+    # Albedo 0.5 under a white sky of radiance 1, of which the mirror dims a part.
+    assert 0.4 < at("R")[floor].mean() < 0.5
     np.testing.assert_allclose(at("normal.Y")[floor], 1, atol=1e-6)
     np.testing.assert_allclose(at("position.Y")[floor], 0, atol=1e-6)
 

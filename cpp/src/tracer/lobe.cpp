@@ -45,12 +45,10 @@ float phong_density(float exponent, glm::vec3 view, glm::vec3 light) {
 float lobe_response(const LobeShape& shape, glm::vec3 view, glm::vec3 light) {
   if (!(view.z > 0.0F) || !(light.z > 0.0F)) return 0.0F;
   if (shape.lobe == SpecularLobe::phong) return phong_density(shape.exponent, view, light);
-  // D G / (4 cosθv cosθl) · cosθl, with G = 2 cosθv cosθl / (cosθv·root_l + cosθl·root_v) for roots times cosines.
-  const float denominator =
-      2.0F * (view.z * scaled_root(shape.roughness, light) + light.z * scaled_root(shape.roughness, view));
-  return denominator > 0.0F
-             ? ggx_distribution(shape.roughness, half_vector(view, light)) * light.z / denominator
-             : 0.0F;
+  // D G₁(v) G₁(l) / (4 cosθv cosθl) · cosθl, with G₁ = 2 cosθ/(cosθ + root).
+  const float denominator = (view.z + scaled_root(shape.roughness, view)) *
+                            (light.z + scaled_root(shape.roughness, light));
+  return ggx_distribution(shape.roughness, half_vector(view, light)) * light.z / denominator;
 }
 
 float lobe_density(const LobeShape& shape, glm::vec3 view, glm::vec3 light) {

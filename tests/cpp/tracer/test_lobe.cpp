@@ -132,8 +132,8 @@ TEST(Lobe, GgxIsReciprocal) {
   }
 }
 
-// The response against the textbook's terms, in double: D, Λ and G₂ of Heitz 2014, eq. 71, 72 and 99.
-TEST(Lobe, GgxIsDistributionTimesCorrelatedMasking) {
+// The response against the textbook's terms, in double: D and G₁ of Walter et al. 2007, eq. 33 and 34.
+TEST(Lobe, GgxIsDistributionTimesMaskingTimesShadowing) {
   for (double alpha : {0.1, 0.5, 1.0}) {
     for (std::uint32_t i = 0; i < 100; ++i) {
       const glm::vec2 a = sobol_2d(i, 3);
@@ -141,14 +141,14 @@ TEST(Lobe, GgxIsDistributionTimesCorrelatedMasking) {
       const glm::dvec3 v = direction(0.05 + 0.95 * static_cast<double>(a.x), 6.28 * static_cast<double>(a.y));
       const glm::dvec3 l = direction(0.05 + 0.95 * static_cast<double>(b.x), 6.28 * static_cast<double>(b.y));
       const glm::dvec3 h = glm::normalize(v + l);
-      const auto lambda = [&](glm::dvec3 w) {
+      const auto masking = [&](glm::dvec3 w) {
         const double tangent2 = (1.0 - w.z * w.z) / (w.z * w.z);
-        return 0.5 * (std::sqrt(1.0 + alpha * alpha * tangent2) - 1.0);
+        return 2.0 / (1.0 + std::sqrt(1.0 + alpha * alpha * tangent2));
       };
       const double tangent2 = (1.0 - h.z * h.z) / (h.z * h.z);
       const double root = 1.0 + tangent2 / (alpha * alpha);
       const double d = 1.0 / (kPi * alpha * alpha * std::pow(h.z, 4) * root * root);
-      const double expected = d / (1.0 + lambda(v) + lambda(l)) / (4.0 * v.z);
+      const double expected = d * masking(v) * masking(l) / (4.0 * v.z);
       EXPECT_NEAR(lobe_response(ggx(static_cast<float>(alpha)), v, l), expected, 1e-4 * expected);
     }
   }

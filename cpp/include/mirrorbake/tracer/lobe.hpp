@@ -8,8 +8,8 @@
 /// Rough specular lobes without their Fresnel term. Directions are unit vectors in a frame whose z is the surface's
 /// normal; `view` points to the eye and `light` to where the light comes from, both away from the surface.
 ///
-/// `ggx`: microfacets with normals after Trowbridge and Reitz, masked and shadowed by Smith's height-correlated term
-/// (Heitz, "Understanding the masking-shadowing function in microfacet-based BRDFs", JCGT 3(2), 2014). Light is
+/// `ggx`: microfacets with normals after Trowbridge and Reitz, masked and shadowed independently by Smith's terms,
+/// G₁(v)·G₁(l) (Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007). Light is
 /// reflected once: what the facets hide is lost, at normal incidence 1 % for α = 0.1 and ln 2 for α = 1.
 /// `phong`: (N+1)/(2π)·(r·l)^N per solid angle, the cosine to the surface's normal included; what falls below
 /// the horizon is lost. It is the filter of prefiltered Phong maps ([EMT] §3.2), and not reciprocal.

@@ -177,9 +177,10 @@ def glowing_ball(directory: Path) -> Twin:
         material = twin.scene.material(twin.scene.object_material(index))
         dark.scene.add_object("wall", twin.scene.object_mesh(index), dark.scene.add_material(material))
     glow = core.Material(albedo=(0.2, 0.2, 0.2), emission=(5, 6, 7))
-    dark.add(
-        core.make_sphere((0.5, 1.0, 0.2), 0.5, 24), glow, {"type": "diffuse", "reflectance": rgb(glow.albedo)}
-    )
+    # Flat: Mitsuba's mesh lights do not shine where an interpolated normal turns away.
+    ball = core.make_sphere((0.5, 1.0, 0.2), 0.5, 24)
+    flat = core.TriangleMesh(ball.positions, ball.triangles)
+    dark.add(flat, glow, {"type": "diffuse", "reflectance": rgb(glow.albedo)})
     return dark
 
 
@@ -218,7 +219,9 @@ def silver_teapot(directory: Path) -> Twin:
         specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel(core.FresnelModel.constant, r0=reflectance)
     )
     bsdf = {"type": "conductor", "material": "none", "specular_reflectance": rgb(reflectance)}
-    twin.add(core.make_teapot(12, 1.2), material, bsdf)
+    teapot = core.make_teapot(12, 1.2)
+    one_part = core.TriangleMesh(teapot.positions, teapot.triangles, normals=teapot.normals)
+    twin.add(one_part, material, bsdf)
     return twin
 
 

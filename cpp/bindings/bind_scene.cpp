@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -154,6 +155,12 @@ void bind_texture(nb::module_& m) {
       .value("repeat", TextureWrap::repeat, "tiled")
       .value("clamp", TextureWrap::clamp, "the border's")
       .value("mirror", TextureWrap::mirror, "tiled, every second tile mirrored");
+  nb::enum_<Transfer>(m, "Transfer", "Whether the values of an image file are decoded from sRGB.")
+      .value("automatic", Transfer::automatic, "integers are, unless the file says that it is linear")
+      .value("srgb", Transfer::srgb)
+      .value("linear", Transfer::linear);
+  m.def("set_texture_cache_bytes", &set_texture_cache_bytes, nb::arg("bytes"),
+        "Bound the cache of all texture files together; 1 GiB until it is set, at least 16 MiB.");
   nb::class_<TextureReference>(
       m, "TextureReference",
       "A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of\n"
@@ -278,17 +285,24 @@ void bind_loaded_scene(nb::module_& m) {
   m.def(
       "load_scene",
       [](const std::string& path, int max_texture_side, std::uint64_t max_texture_bytes,
-         std::uint64_t max_vertices, std::uint64_t max_triangles, float luminous_efficacy) {
-        return load_scene(
-            path, {{max_vertices, max_triangles}, max_texture_side, max_texture_bytes, luminous_efficacy});
+         std::uint64_t cache_textures_above, std::uint64_t max_vertices, std::uint64_t max_triangles,
+         float luminous_efficacy) {
+        return load_scene(path, {{max_vertices, max_triangles},
+                                 max_texture_side,
+                                 max_texture_bytes,
+                                 cache_textures_above,
+                                 luminous_efficacy});
       },
       nb::arg("path"), nb::kw_only(), nb::arg("max_texture_side") = SceneOptions{}.max_texture_side,
       nb::arg("max_texture_bytes") = SceneOptions{}.max_texture_bytes,
+      nb::arg("cache_textures_above") = SceneOptions{}.cache_textures_above,
       nb::arg("max_vertices") = MeshLimits{}.max_vertices,
       nb::arg("max_triangles") = MeshLimits{}.max_triangles, nb::arg("luminous_efficacy") = 1.0F,
       nb::call_guard<nb::gil_scoped_release>(),
       "Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,\n"
-      "materials, textures, lights and cameras. glTF's candela, lux and nits are divided by\n"
+      "materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in "
+      "memory\n"
+      "are read through the cache of texture files. glTF's candela, lux and nits are divided by\n"
       "`luminous_efficacy` (lumens per watt). Raises FileError if a file is missing, corrupt, beyond a limit "
       "or\n"
       "refers to files outside its directory.");
@@ -315,6 +329,23 @@ void bind_scene(nb::module_& m) {
           },
           nb::arg("pixels"), nb::arg("wrap_u") = TextureWrap::repeat, nb::arg("wrap_v") = TextureWrap::repeat,
           "Add a texture of shape (height, width, 3), values in [0, 1], row 0 at the top.")
+      .def(
+          "add_texture_file",
+          [](Scene& scene, const std::string& path, TextureWrap wrap_u, TextureWrap wrap_v,
+             Transfer transfer) {
+            Texture texture;
+            texture.wrap_u = wrap_u;
+            texture.wrap_v = wrap_v;
+            {
+              nb::gil_scoped_release released;
+              texture.file = std::make_shared<TextureFile>(path, transfer);
+            }
+            return append(scene.textures, std::move(texture));
+          },
+          nb::arg("path"), nb::arg("wrap_u") = TextureWrap::repeat, nb::arg("wrap_v") = TextureWrap::repeat,
+          nb::arg("transfer") = Transfer::automatic,
+          "Add a texture whose texels are read from an image file when they are needed, and kept in a cache\n"
+          "of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].")
       .def(
           "add_material",
           [](Scene& scene, const Material& material) { return append(scene.materials, material); },

@@ -376,6 +376,21 @@ class TextureWrap(enum.Enum):
     mirror = 2
     """tiled, every second tile mirrored"""
 
+class Transfer(enum.Enum):
+    """Whether the values of an image file are decoded from sRGB."""
+
+    automatic = 0
+    """integers are, unless the file says that it is linear"""
+
+    srgb = 1
+
+    linear = 2
+
+def set_texture_cache_bytes(bytes: int) -> None:
+    """
+    Bound the cache of all texture files together; 1 GiB until it is set, at least 16 MiB.
+    """
+
 class TextureReference:
     """
     A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of
@@ -604,6 +619,12 @@ class Scene:
         Add a texture of shape (height, width, 3), values in [0, 1], row 0 at the top.
         """
 
+    def add_texture_file(self, path: str, wrap_u: TextureWrap = TextureWrap.repeat, wrap_v: TextureWrap = TextureWrap.repeat, transfer: Transfer = Transfer.automatic) -> int:
+        """
+        Add a texture whose texels are read from an image file when they are needed, and kept in a cache
+        of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].
+        """
+
     def add_material(self, material: Material) -> int:
         """Add a copy of a material."""
 
@@ -727,10 +748,11 @@ class LoadedScene:
     @property
     def warnings(self) -> list[SceneWarning]: ...
 
-def load_scene(path: str, *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0) -> LoadedScene:
+def load_scene(path: str, *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, cache_textures_above: int = 67108864, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0) -> LoadedScene:
     """
     Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,
-    materials, textures, lights and cameras. glTF's candela, lux and nits are divided by
+    materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in memory
+    are read through the cache of texture files. glTF's candela, lux and nits are divided by
     `luminous_efficacy` (lumens per watt). Raises FileError if a file is missing, corrupt, beyond a limit or
     refers to files outside its directory.
     """

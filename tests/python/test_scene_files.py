@@ -16,7 +16,7 @@ from mirrorbake.errors import InputError
 from mirrorbake.evaluate import evaluate
 from mirrorbake.scene import build_scene, hash_inputs
 
-from .gltf_scene import SQUARE, SQUARE_NORMALS, SQUARE_TRIANGLES, SQUARE_UVS, GlbScene
+from .gltf_scene import SQUARE, SQUARE_NORMALS, SQUARE_TRIANGLES, SQUARE_UVS, GlbScene, png
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -270,6 +270,32 @@ def test_a_scene_object_that_cannot_be_a_reflector_is_an_error(tmp_path: Path) -
         build(scene_object="gem", height=2.0)
     with pytest.raises(InputError, match=r"needs surroundings\.scene"):
         parse_config({"reflector": {"scene_object": "gem"}}, "s")
+
+
+def test_a_texture_that_stays_in_its_file_looks_like_one_in_memory(tmp_path: Path) -> None:
+    texels = np.random.default_rng(5).integers(0, 256, (64, 64, 3)).astype(np.uint8)
+    (tmp_path / "map.png").write_bytes(png(texels))
+    mirrorbake.set_texture_cache_bytes(64 << 20)
+    mesh = _core.TriangleMesh(SQUARE, SQUARE_TRIANGLES, SQUARE_NORMALS, SQUARE_UVS)
+    images = []
+    for in_file in (False, True):
+        scene = mirrorbake.Scene()
+        if in_file:
+            texture = scene.add_texture_file(str(tmp_path / "map.png"), transfer=_core.Transfer.srgb)
+        else:
+            texture = scene.add_texture(mirrorbake.load_image(str(tmp_path / "map.png"))[0])
+        reference = mirrorbake.TextureReference(texture)
+        material = mirrorbake.Material(albedo=(1, 1, 1), albedo_texture=reference)
+        scene.add_object("floor", mesh, scene.add_material(material))
+        scene.add_directional_light((0, -1, 0), (math.pi, math.pi, math.pi))
+        images.append(top_view(scene, spp=16))
+    assert images[0].std() > 0.02
+    # Texels are halves, and lie where rounding puts them.
+    np.testing.assert_allclose(images[0], images[1], atol=1e-3)
+    with pytest.raises(mirrorbake.FileError, match=r"gone\.png"):
+        scene.add_texture_file(str(tmp_path / "gone.png"))
+    with pytest.raises(mirrorbake.InvalidArgument, match="texture cache bytes is 1"):
+        mirrorbake.set_texture_cache_bytes(1)
 
 
 def test_cameras_and_warnings_come_with_the_scene(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@
 #include <optional>
 #include <set>
 
+#include "image_files.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
@@ -204,20 +205,15 @@ Image without_alpha(Image image, int alpha) {
   return image;
 }
 
-Image read(const std::string& path, FileKind kind, const DecodeOptions& options,
-           std::optional<std::span<const unsigned char>> memory = std::nullopt) {
-  const ImageLimits& limits = options.limits;
-  std::optional<OIIO::Filesystem::IOMemReader> proxy;
-  const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(plugin_name(kind));
+std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path, FileKind kind,
+                                             const ImageLimits& limits, OIIO::Filesystem::IOProxy* proxy,
+                                             OIIO::ImageSpec& spec) {
+  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(plugin_name(kind));
   if (!input) throw FileError(path, "cannot be read: " + OIIO::geterror());
-  // Unassociated alpha is multiplied in here, in linear light, and not by the reader in encoded values.
+  if (proxy != nullptr && !input->set_ioproxy(proxy)) throw FileError(path, "cannot be read from memory");
+  // Unassociated alpha is multiplied in by us, in linear light, and not by the reader in encoded values.
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
-  OIIO::ImageSpec spec;
-  if (memory) {
-    proxy.emplace(memory->data(), memory->size());
-    if (!input->set_ioproxy(&*proxy)) throw FileError(path, "cannot be read from memory");
-  }
   if (!input->open(path, spec, config)) throw FileError(path, "cannot be read: " + input->geterror());
   if (spec.deep) throw FileError(path, "holds deep samples, expected flat pixels");
   if (spec.depth > 1) throw FileError(path, "is a volume, expected an image");
@@ -229,6 +225,16 @@ Image read(const std::string& path, FileKind kind, const DecodeOptions& options,
     spec.full_height = spec.height;
   }
   check_limits(path, spec.full_width, spec.full_height, spec.nchannels, limits);
+  return input;
+}
+
+Image read(const std::string& path, FileKind kind, const DecodeOptions& options,
+           std::optional<std::span<const unsigned char>> memory = std::nullopt) {
+  std::optional<OIIO::Filesystem::IOMemReader> proxy;
+  if (memory) proxy.emplace(memory->data(), memory->size());
+  OIIO::ImageSpec spec;
+  const std::unique_ptr<OIIO::ImageInput> input =
+      open_input(path, kind, options.limits, proxy ? &*proxy : nullptr, spec);
   if (memory) check_expansion(path, kind, spec, memory->size());
 
   Image image;
@@ -243,10 +249,7 @@ Image read(const std::string& path, FileKind kind, const DecodeOptions& options,
       input->has_error()) {
     throw FileError(path, "is damaged or truncated: " + input->geterror());
   }
-  const bool is_encoded = options.transfer == Transfer::automatic
-                              ? is_integer(spec.format) && !says_linear(spec)
-                              : options.transfer == Transfer::srgb;
-  if (is_encoded) decode_srgb(spec, image.pixels);
+  if (image_files::is_srgb(spec, options.transfer)) decode_srgb(spec, image.pixels);
   if (options.alpha == AlphaUse::multiply && spec.alpha_channel >= 0 &&
       spec.get_int_attribute("oiio:UnassociatedAlpha") != 0) {
     multiply_by_alpha(spec, image.pixels);
@@ -362,6 +365,20 @@ void encode(const OIIO::ImageSpec& spec, FileKind kind, std::span<float> values,
 
 }  // namespace
 
+std::unique_ptr<OIIO::ImageInput> image_files::open_file(const std::string& path, const ImageLimits& limits,
+                                                         OIIO::ImageSpec& spec) {
+  const FileKind kind = kind_from_content(path);
+  if (kind == FileKind::jpeg && !jpeg_is_complete(path)) throw FileError(path, "is truncated");
+  std::unique_ptr<OIIO::ImageInput> input = open_input(path, kind, limits, nullptr, spec);
+  check_expansion(path, kind, spec, std::filesystem::file_size(path));
+  return input;
+}
+
+bool image_files::is_srgb(const OIIO::ImageSpec& spec, Transfer transfer) {
+  if (transfer == Transfer::automatic) return is_integer(spec.format) && !says_linear(spec);
+  return transfer == Transfer::srgb;
+}
+
 PixelFormat parse_pixel_format(std::string_view name) {
   if (name == "automatic") return PixelFormat::automatic;
   if (name == "half") return PixelFormat::half;
@@ -387,6 +404,18 @@ Image load_image(const std::string& path, const ImageLimits& limits) {
   return file_errors(path, [&] {
     return read(path, kind, {limits, Transfer::automatic, AlphaUse::multiply});
   });
+}
+
+ImageSize read_image_size(const std::string& path, const ImageLimits& limits) {
+  try {
+    OIIO::ImageSpec spec;
+    const auto input = image_files::open_file(path, limits, spec);
+    return {spec.full_width, spec.full_height, spec.nchannels};
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& e) {
+    throw FileError(path, std::string("is damaged: ") + e.what());
+  }
 }
 
 Image decode_image(const std::string& name, std::span<const unsigned char> bytes,

@@ -197,6 +197,13 @@ int MaterialReader::uv_set(int material) {
   return first.value_or(0);
 }
 
+std::string MaterialReader::image_file(const tinygltf::Image& image) const {
+  const std::string reference = percent_decoded(image.uri);
+  const auto file = resolve_inside(std::filesystem::path(path_).parent_path(), reference);
+  if (!file) fail(path_, "refers to '" + reference + "', which is not inside the file's own directory");
+  return file->string();
+}
+
 Image MaterialReader::decode(int index, Transfer transfer) {
   const tinygltf::Image& image = element(path_, model_.images, index, "image");
   const std::string name = path_ + ": image " + std::to_string(index);
@@ -204,12 +211,9 @@ Image MaterialReader::decode(int index, Transfer transfer) {
     return reader_.read(name, view_bytes(path_, model_, image.bufferView, "image"), transfer);
   }
   if (image.uri.empty()) return reader_.read(name, image.image, transfer);
-  const std::string reference = percent_decoded(image.uri);
-  const auto file = resolve_inside(std::filesystem::path(path_).parent_path(), reference);
-  if (!file) fail(path_, "refers to '" + reference + "', which is not inside the file's own directory");
-  const std::string bytes = read_file(*file);
-  return reader_.read(file->string(), {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()},
-                      transfer);
+  const std::string file = image_file(image);
+  const std::string bytes = read_file(file);
+  return reader_.read(file, {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()}, transfer);
 }
 
 template <typename Make>
@@ -219,16 +223,26 @@ TextureReference MaterialReader::made_texture(const Use& use, const std::string&
                           std::to_string(static_cast<int>(use.wrap_v));
   auto it = texture_of_.find(key);
   if (it == texture_of_.end()) {
-    Image image = make();
+    Texture texture = make();
+    texture.wrap_u = use.wrap_u;
+    texture.wrap_v = use.wrap_v;
     it = texture_of_.emplace(key, static_cast<int>(scene_.textures.size())).first;
-    scene_.textures.push_back({std::move(image), use.wrap_u, use.wrap_v});
+    scene_.textures.push_back(std::move(texture));
   }
   reference.texture = it->second;
   return reference;
 }
 
-TextureReference MaterialReader::plain_texture(const Use& use, Transfer transfer) {
-  return made_texture(use, "image " + std::to_string(use.image), [&] { return decode(use.image, transfer); });
+TextureReference MaterialReader::plain_texture(const Use& use) {
+  return made_texture(use, "image " + std::to_string(use.image), [&] {
+    const tinygltf::Image& image = element(path_, model_.images, use.image, "image");
+    if (image.bufferView < 0 && !image.uri.empty()) {
+      return reader_.read_file_texture(image_file(image), Transfer::srgb);
+    }
+    Texture texture;
+    texture.image = decode(use.image, Transfer::srgb);
+    return texture;
+  });
 }
 
 MaterialReader::Parameters MaterialReader::parameters(const tinygltf::Material& material,
@@ -281,7 +295,7 @@ void MaterialReader::set_colours(const Parameters& p, Material& result) {
     result.albedo = p.base * (1.0F - metallic);
     result.fresnel.r0 = glm::mix(glm::vec3(p.dielectric_r0), p.base, metallic);
     if (!base) return;
-    const TextureReference texture = plain_texture(*base, Transfer::srgb);
+    const TextureReference texture = plain_texture(*base);
     if (metallic == 0.0F) result.albedo_texture = texture;
     if (metallic == 1.0F) result.specular_texture = texture;
     return;
@@ -297,7 +311,9 @@ void MaterialReader::set_colours(const Parameters& p, Material& result) {
     if (varying && !mr_image) mr_image = decode(varying->image, Transfer::linear);
     Image image = combined(base ? &*base_image : nullptr, varying ? &*mr_image : nullptr, channels, value);
     reader_.reserve(path_, image.width, image.height, channels);
-    return image;
+    Texture texture;
+    texture.image = std::move(image);
+    return texture;
   };
   const auto metallic_at = [&](glm::vec3 mr) { return varying ? metallic * mr.z : metallic; };
   result.albedo = p.base;
@@ -329,7 +345,9 @@ void MaterialReader::set_roughness(const Parameters& p, Material& result) {
         Image image =
             combined(nullptr, &source, 1, [](glm::vec3, glm::vec3 mr) { return glm::vec3(mr.y * mr.y); });
         reader_.reserve(path_, image.width, image.height, 1);
-        return image;
+        Texture texture;
+        texture.image = std::move(image);
+        return texture;
       });
 }
 
@@ -351,7 +369,7 @@ Material MaterialReader::convert(const tinygltf::Material& material, const std::
     // The colour is what the eye sees, whatever the light.
     result.albedo = glm::vec3(0.0F);
     result.emission = p.base / nits_per_radiance_;
-    if (p.base_use) result.emission_texture = plain_texture(*p.base_use, Transfer::srgb);
+    if (p.base_use) result.emission_texture = plain_texture(*p.base_use);
     return result;
   }
   result.layers = LayerModel::coated;
@@ -372,7 +390,7 @@ Material MaterialReader::convert(const tinygltf::Material& material, const std::
   const auto& info = material.emissiveTexture;
   const std::optional<Use> emission = use_of(info.index, info.texCoord, info.extensions, where + "emissive");
   if (emission && result.emission != glm::vec3(0.0F)) {
-    result.emission_texture = plain_texture(*emission, Transfer::srgb);
+    result.emission_texture = plain_texture(*emission);
   }
   return result;
 }

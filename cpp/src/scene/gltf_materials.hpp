@@ -53,8 +53,9 @@ class MaterialReader {
   void set_roughness(const Parameters& p, Material& result);
   void warn_of_what_is_lost(const tinygltf::Material& material);
 
+  std::string image_file(const tinygltf::Image& image) const;
   Image decode(int image, Transfer transfer);
-  TextureReference plain_texture(const Use& use, Transfer transfer);
+  TextureReference plain_texture(const Use& use);  ///< of a colour image as it is
   /// The texture of this name, made only once.
   template <typename Make>
   TextureReference made_texture(const Use& use, const std::string& name, const Make& make);

@@ -122,14 +122,13 @@ class ObjScene {
       if (largest != nullptr) *largest = it->second.second;
       return;
     }
-    const std::string bytes = read_file(file);
     float factor = 1.0F;
-    Image image =
-        textures_.read(file.string(), {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()},
-                       Transfer::automatic, largest != nullptr ? &factor : nullptr);
+    Texture texture = textures_.read_file_texture(file.string(), Transfer::automatic,
+                                                  largest != nullptr ? &factor : nullptr);
+    texture.wrap_u = texture.wrap_v = map.wrap;
     if (largest != nullptr) *largest = factor;
     reference.texture = static_cast<int>(loaded_.scene.textures.size());
-    loaded_.scene.textures.push_back({std::move(image), map.wrap, map.wrap});
+    loaded_.scene.textures.push_back(std::move(texture));
     texture_of_.emplace(key, std::pair(reference.texture, factor));
   }
 

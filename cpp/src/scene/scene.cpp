@@ -281,6 +281,7 @@ float spot_falloff(const SpotLight& light, float cosine) {
 void validate(const Scene& scene) {
   for (std::size_t i = 0; i < scene.textures.size(); ++i) {
     const std::string where = label("texture", i, "");
+    if (scene.textures[i].file) continue;  // checked when it was opened
     check_channel_count(where, scene.textures[i].image, {1, 3});
     check_pixel_count(where, scene.textures[i].image);
     check_texels(where, scene.textures[i].image, 1.0F, "a value in [0, 1]");

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <set>
 
+#include "file_bytes.hpp"
 #include "mirrorbake/core/error.hpp"
 
 namespace mirrorbake {
@@ -102,6 +104,24 @@ Image TextureReader::read(const std::string& name, std::span<const unsigned char
   }
   if (largest != nullptr) *largest = most;
   return image;
+}
+
+Texture TextureReader::read_file_texture(const std::string& path, Transfer transfer, float* largest) {
+  Texture texture;
+  ImageLimits limits;
+  limits.max_side = options_.max_texture_side;
+  const ImageSize size = read_image_size(path, limits);
+  const std::uint64_t decoded = static_cast<std::uint64_t>(size.width) *
+                                static_cast<std::uint64_t>(size.height) *
+                                static_cast<std::uint64_t>(std::min(size.channels, 3)) * sizeof(float);
+  if (decoded > options_.cache_textures_above) {
+    texture.file = std::make_shared<TextureFile>(path, transfer, limits);
+    return texture;
+  }
+  const std::string bytes = read_file(path);
+  texture.image =
+      read(path, {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()}, transfer, largest);
+  return texture;
 }
 
 glm::vec3 radiance(const std::string& path, const std::string& what, glm::vec3 value) {

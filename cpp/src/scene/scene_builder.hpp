@@ -37,6 +37,10 @@ class TextureReader {
   Image read(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
              float* largest = nullptr);
 
+  /// The texture of an image file that is used as it is: in memory, or through the cache if it is large. Large ones beyond 1
+  /// are an error.
+  Texture read_file_texture(const std::string& path, Transfer transfer, float* largest = nullptr);
+
   /// Takes room for a texture that is made here. Throws FileError(name) beyond the limits.
   void reserve(const std::string& name, int width, int height, int channels);
 

@@ -35,6 +35,7 @@ glm::vec2 texture_coordinates(const TextureReference& reference, glm::vec2 uv) {
 }
 
 glm::vec3 texture_lookup(const Texture& texture, glm::vec2 uv) {
+  if (texture.file) return texture.file->lookup(uv, 0.0F, texture.wrap_u, texture.wrap_v);
   const Image& image = texture.image;
   const float x = wrapped(uv.x, texture.wrap_u) * static_cast<float>(image.width) - 0.5F;
   const float y = (1.0F - wrapped(uv.y, texture.wrap_v)) * static_cast<float>(image.height) - 0.5F;
@@ -50,6 +51,17 @@ glm::vec3 texture_lookup(const Texture& texture, glm::vec2 uv) {
   };
   return (1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
          fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
+}
+
+glm::vec3 texture_mean(const Texture& texture) {
+  if (texture.file) return texture.file->mean();
+  const Image& image = texture.image;
+  const std::size_t channels = image.channels.size();
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 0; i < image.pixels.size(); i += channels) {
+    for (std::size_t c = 0; c < 3; ++c) sum[static_cast<int>(c)] += image.pixels[i + (channels == 1 ? 0 : c)];
+  }
+  return glm::vec3(sum / static_cast<double>(image.pixels.size() / channels));
 }
 
 glm::vec3 texture_lookup(const Scene& scene, const TextureReference& reference, glm::vec2 uv) {

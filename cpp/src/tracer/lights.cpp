@@ -140,17 +140,6 @@ std::optional<LightSample> towards(glm::vec3 point, glm::vec3 position) {
   return LightSample{to / distance, distance, glm::vec3(1.0F / (distance * distance)), 0.0F};
 }
 
-// Mean of a texture's texels, the share of an emission that it lets through.
-glm::vec3 mean_texel(const Texture& texture) {
-  const Image& image = texture.image;
-  const std::size_t channels = image.channels.size();
-  glm::dvec3 sum(0.0);
-  for (std::size_t i = 0; i < image.pixels.size(); i += channels) {
-    for (std::size_t c = 0; c < 3; ++c) sum[static_cast<int>(c)] += image.pixels[i + (channels == 1 ? 0 : c)];
-  }
-  return glm::vec3(sum / static_cast<double>(image.pixels.size() / channels));
-}
-
 }  // namespace
 
 EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
@@ -306,7 +295,7 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
     const Material& material = scene.materials[static_cast<std::size_t>(scene.objects[i].material)];
     glm::vec3 emission = material.emission;
     if (luminance(emission) > 0.0F && material.emission_texture.texture >= 0) {
-      emission *= mean_texel(scene.textures[static_cast<std::size_t>(material.emission_texture.texture)]);
+      emission *= texture_mean(scene.textures[static_cast<std::size_t>(material.emission_texture.texture)]);
     }
     if (luminance(emission) <= 0.0F) continue;
     const TriangleMesh& mesh = scene.objects[i].mesh;

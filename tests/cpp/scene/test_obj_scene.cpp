@@ -150,7 +150,7 @@ TEST_F(ObjSceneFile, DefectsAreNamedWithTheirLine) {
   expect_error("newmtl red\nillum 99\n", "line 2: illum '99', expected 0 to 10");
   expect_error("newmtl red\nmap_Kd\n", "expected the name of an image");
   expect_error("newmtl red\nmap_Kd -s x a.png\n", "expected a number after -s");
-  expect_error("newmtl red\nmap_Kd gone.png\n", "gone.png: no such file");
+  expect_error("newmtl red\nmap_Kd gone.png\n", "gone.png: does not exist");
   expect_error("newmtl red\nmap_Kd text.png\n", "text.png: is not an EXR");
   expect_error("newmtl red\nmap_Kd ../text.png\n", "refers to '../text.png', which is not inside");
   expect_error("newmtl red\nmap_Kd /etc/passwd\n", "refers to '/etc/passwd', which is not inside");

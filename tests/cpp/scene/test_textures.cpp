@@ -3,13 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <random>
+#include <tuple>
+#include <vector>
 
+#include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/trigonometric.hpp>
 
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/image/image_io.hpp"
+#include "mirrorbake/scene/load.hpp"
 #include "mirrorbake/scene/scene.hpp"
+#include "temporary_files.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -68,6 +77,114 @@ TEST(Texture, OneChannelStandsForAllThree) {
   texture.image = Image(1, 1, {"Y"});
   texture.image.pixels = {0.25F};
   EXPECT_EQ(texture_lookup(texture, {0.3F, 0.4F}), glm::vec3(0.25F));
+}
+
+class TextureFiles : public testing::FileTest {
+ protected:
+  std::string save(const std::string& name, int width, int height, PixelFormat format) const {
+    Image image(width, height, {"R", "G", "B"});
+    std::mt19937 random(3);
+    for (float& v : image.pixels) v = std::uniform_real_distribution<float>(0.0F, 1.0F)(random);
+    save_image((directory_ / name).string(), image, format);
+    return (directory_ / name).string();
+  }
+};
+
+TEST_F(TextureFiles, FindTheSameTexelsAsTexturesInMemory) {
+  // Halves have 11 bits; the rest is rounding.
+  for (const auto& [name, format, tolerance] :
+       {std::tuple("a.png", PixelFormat::uint8, 5e-4), std::tuple("b.png", PixelFormat::uint16, 2e-6),
+        std::tuple("c.exr", PixelFormat::float32, 2e-6), std::tuple("d.tif", PixelFormat::float32, 2e-6)}) {
+    const std::string path = save(name, 150, 70, format);
+    const auto file = std::make_shared<TextureFile>(path);
+    EXPECT_EQ(file->width(), 150);
+    EXPECT_EQ(file->height(), 70);
+    for (const TextureWrap wrap : {TextureWrap::repeat, TextureWrap::clamp, TextureWrap::mirror}) {
+      const Texture in_memory{load_image(path), wrap, wrap};
+      const Texture in_file{{}, wrap, wrap, file};
+      std::mt19937 random(4);
+      std::uniform_real_distribution<float> any(-2.5F, 2.5F);
+      for (int i = 0; i < 500; ++i) {
+        const glm::vec2 uv(any(random), any(random));
+        const glm::vec3 expected = texture_lookup(in_memory, uv);
+        // Coordinates of up to 150 texels are rounded, and texels differ by up to 1.
+        EXPECT_LT(glm::distance(texture_lookup(in_file, uv), expected), tolerance + 3e-4) << name << " " << i;
+      }
+      EXPECT_LT(glm::distance(texture_mean(in_file), texture_mean(in_memory)), 1e-5F);
+    }
+  }
+}
+
+TEST_F(TextureFiles, WideFootprintsFindMeans) {
+  const std::string path = save("a.exr", 256, 256, PixelFormat::float32);
+  const TextureFile file(path);
+  const glm::vec3 wide = file.lookup({0.3F, 0.6F}, 1.0F, TextureWrap::repeat, TextureWrap::repeat);
+  EXPECT_LT(glm::distance(wide, file.mean()), 1e-3F);
+  // Uniform noise has a variance of 1/12; the mean of 16 × 16 texels has 1/256 of that, a standard deviation of 0.018.
+  double square = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    const glm::vec2 uv(0.05F * static_cast<float>(i % 20), 0.05F * static_cast<float>(i / 20));
+    const float red = file.lookup(uv, 1.0F / 16.0F, TextureWrap::repeat, TextureWrap::repeat).x;
+    square += static_cast<double>((red - 0.5F) * (red - 0.5F)) / 400.0;
+  }
+  EXPECT_GT(std::sqrt(square), 0.008);
+  EXPECT_LT(std::sqrt(square), 0.025);
+}
+
+TEST_F(TextureFiles, LookupsThroughASmallCacheOnManyThreadsGiveTheSameBits) {
+  set_texture_cache_bytes(std::uint64_t{16} << 20);
+  // 48 MiB of texels, and lookups all over them.
+  const Texture texture{{},
+                        TextureWrap::repeat,
+                        TextureWrap::repeat,
+                        std::make_shared<TextureFile>(save("a.exr", 2048, 2048, PixelFormat::float32))};
+  std::vector<glm::vec3> found[2];
+  for (std::vector<glm::vec3>& values : found) {
+    const ThreadLimit limit(&values == &found[0] ? 1 : 4);
+    values.resize(64);
+    parallel_for(values.size(), 4, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        // From strip to strip of 64 rows, of which the cache holds about ten.
+        const float x = static_cast<float>(i);
+        values[i] = texture_lookup(texture, {0.754877666F * x, 0.569840296F * std::floor(x / 4.0F)});
+      }
+    });
+  }
+  EXPECT_EQ(found[0], found[1]);
+  set_texture_cache_bytes(std::uint64_t{1} << 30);
+  EXPECT_THROW(set_texture_cache_bytes(1), InvalidArgument);
+}
+
+TEST_F(TextureFiles, DamagedFilesAreNamedWhenTheyAreOpened) {
+  const std::string path = save("a.png", 64, 64, PixelFormat::uint8);
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+  EXPECT_THROW(TextureFile{path}, FileError);
+  EXPECT_THROW(TextureFile{(directory_ / "missing.png").string()}, FileError);
+  EXPECT_THROW(TextureFile{write("text.png", "no image")}, FileError);
+  Image bright(1, 1, {"R", "G", "B"});
+  bright.pixels = {0.5F, 2.0F, 0.0F};
+  const std::string bright_path = (directory_ / "bright.exr").string();
+  save_image(bright_path, bright);
+  EXPECT_THROW(TextureFile{bright_path}, FileError);
+  Image layers(1, 1, {"X", "Y"});
+  save_image((directory_ / "layers.exr").string(), layers);
+  EXPECT_THROW(TextureFile{(directory_ / "layers.exr").string()}, FileError);
+}
+
+TEST_F(TextureFiles, LargeImagesOfSceneFilesGoThroughTheCache) {
+  save("map.png", 32, 32, PixelFormat::uint8);
+  write("a.mtl", "newmtl m\nmap_Kd map.png\n");
+  const std::string path = write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+  SceneOptions options;
+  options.cache_textures_above = 32 * 32 * 3 * sizeof(float);
+  const Scene in_memory = load_scene(path, options).scene;
+  EXPECT_EQ(in_memory.textures.at(0).file, nullptr);
+  options.cache_textures_above -= 1;
+  const Scene cached = load_scene(path, options).scene;
+  ASSERT_NE(cached.textures.at(0).file, nullptr);
+  const glm::vec2 uv(0.3F, 0.7F);
+  EXPECT_LT(glm::distance(texture_lookup(cached.textures[0], uv), texture_lookup(in_memory.textures[0], uv)),
+            1e-3F);
 }
 
 // The matrices as the extension's text has them, in double precision.

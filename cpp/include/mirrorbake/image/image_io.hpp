@@ -38,6 +38,15 @@ struct SaveReport {
 /// missing, not an image, truncated or beyond `limits`.
 Image load_image(const std::string& path, const ImageLimits& limits = {});
 
+struct ImageSize {
+  int width = 0;   ///< pixels
+  int height = 0;  ///< pixels
+  int channels = 0;
+};
+
+/// Reads what a file's header says. Throws FileError as load_image does, but for damaged pixels.
+ImageSize read_image_size(const std::string& path, const ImageLimits& limits = {});
+
 /// Whether integers are decoded from sRGB: as load_image does, always (floats too), or never.
 enum class Transfer { automatic, srgb, linear };
 

@@ -29,7 +29,10 @@ TriangleMesh load_mesh(const std::string& path, const MeshLimits& limits = {});
 struct SceneOptions {
   MeshLimits meshes;  ///< of all objects together
   int max_texture_side = 16384;
-  std::uint64_t max_texture_bytes = std::uint64_t{4} << 30;  ///< of all decoded textures together
+  std::uint64_t max_texture_bytes = std::uint64_t{4} << 30;  ///< of all textures in memory together
+  /// Images in files of their own that would take more than this in memory are read through the cache of
+  /// texture files instead; not those from which textures are made.
+  std::uint64_t cache_textures_above = std::uint64_t{64} << 20;
   /// glTF measures light in candela, lux and nits. Its numbers are divided by this many lumens per watt: 1 takes them as
   /// they are, 683 gives watts of green light, as Blender's exporter assumes.
   float luminous_efficacy = 1.0F;

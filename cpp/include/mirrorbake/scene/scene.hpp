@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include <glm/vec3.hpp>
 
 #include "mirrorbake/image/image.hpp"
+#include "mirrorbake/image/texture_file.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
 
 /// What a scene is made of: plain values. World space is right-handed, +Y up, in metres; colours and radiance
@@ -22,14 +24,13 @@ struct TriangleMesh {
   std::vector<std::uint16_t> parts;   ///< part of each triangle; empty: all belong to part 0
 };
 
-/// How a coordinate outside [0,1] finds a texel: tiled, the border's, or tiled with every second tile mirrored.
-enum class TextureWrap { repeat, clamp, mirror };
-
-/// Texels that materials refer to.
+/// Texels that materials refer to: in memory, or in a file.
 struct Texture {
-  Image image;  ///< one channel, which stands for all three, or R, G, B; scene-linear
+  Image
+      image;  ///< one channel, which stands for all three, or R, G, B; scene-linear; unused if there is a file
   TextureWrap wrap_u = TextureWrap::repeat;
   TextureWrap wrap_v = TextureWrap::repeat;
+  std::shared_ptr<const TextureFile> file = nullptr;
 };
 
 /// A use of a texture. The texture coordinates are transformed as KHR_texture_transform defines it, in that
@@ -46,8 +47,12 @@ struct TextureReference {
 /// The coordinates, v up, at which a texture is looked up for a mesh's coordinates `uv`, v up.
 glm::vec2 texture_coordinates(const TextureReference& reference, glm::vec2 uv);
 
-/// Texels around a point, interpolated bilinearly; `uv`, v up, are the texture's own coordinates.
+/// Texels around a point, interpolated bilinearly; `uv`, v up, are the texture's own coordinates. Throws FileError if the
+/// texture's file has changed since it was opened.
 glm::vec3 texture_lookup(const Texture& texture, glm::vec2 uv);
+
+/// Mean of all texels.
+glm::vec3 texture_mean(const Texture& texture);
 
 /// Shape of the specular lobe about the mirror direction: a perfect mirror; microfacets with normals distributed
 /// after Trowbridge and Reitz (GGX; Walter et al., "Microfacet models for refraction through rough surfaces", EGSR

@@ -1,10 +1,16 @@
 """First hits of rays against embreex, the Python binding of Embree 4, on the same triangles.
 
 Both are given arrays and return arrays. mirrorbake also returns object and normal, and checks every ray.
+Where the program bench_rays is built (cmake --preset release; cmake --build --preset release --target
+bench_rays) it adds a comparison with a bare loop over Embree in C++.
 """
 
+import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -16,7 +22,30 @@ from mirrorbake import _core as core
 RAYS = 1_000_000
 
 
+def bare_embree() -> Iterator[Case]:
+    found = sorted(
+        Path(__file__).parents[1].glob("build/*/cpp/bench/bench_rays"), key=lambda path: path.stat().st_mtime
+    )
+    if not found:
+        print("bench: bench_rays is not built; no comparison with bare Embree", file=sys.stderr)
+        return
+    done = subprocess.run([found[-1]], stdout=subprocess.PIPE, text=True, check=False)
+    require(done.returncode == 0, "bench_rays says so")
+    for line in done.stdout.splitlines():
+        row = json.loads(line)
+        yield Case(
+            case=f"{row['case']}, {row['rays']} rays, {row['threads']} threads",
+            unit="ns per ray",
+            ours=1e3 / row["ours"],
+            peer=1e3 / row["ours"] * row["share"],
+            peer_name="bare Embree (by processor time)",
+            error_ours=0.0,
+            error_peer=0.0,
+        )
+
+
 def cases() -> Iterator[Case]:
+    yield from bare_embree()
     scene = core.make_room()
     scene.add_object(
         "teapot", core.make_teapot(), scene.add_material(core.Material()), core.teapot_part_names()

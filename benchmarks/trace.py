@@ -2,11 +2,13 @@
 
 The scene: a box room with a rectangle light and a mirror ball of 9,000 triangles, paths of any length.
 Times are scaled to equal error: a renderer with half the variance at the same time counts as twice as fast.
+Then one thread against two, and the tracer's time and memory for balls of 10,000 to 5 million triangles.
 """
 
 from __future__ import annotations
 
 import tempfile
+import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -140,5 +142,57 @@ def cases() -> Iterator[Case]:
         )
 
 
+def scaling() -> Iterator[Case]:
+    """One thread is the peer of two."""
+    tracer = core.Tracer(
+        our_scene(core.make_sphere((0, 1, 0), 0.7, 96)), core.TracerOptions(indirect=core.IndirectLight.path)
+    )
+    camera = core.Camera(EYE, TARGET, vertical_fov_degrees=FOV, width=2 * SIZE, height=2 * SIZE)
+    images, times = [], []
+    for threads in (1, 2):
+        limit = core.ThreadLimit(threads)
+        run_once = partial(tracer.trace_beauty, camera, core.TraceOptions(samples_per_pixel=16))
+        images.append(np.asarray(run_once()))
+        times.append(seconds(run_once, 3))
+        del limit
+    require(bool((images[0] == images[1]).all()), "one thread and two")
+    yield Case("the same room on two threads", "s per image", times[1], times[0], "one thread", 0.0, 0.0)
+
+
+def resident_megabytes() -> float:
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return int(line.split()[1]) / 1024
+    return float("nan")
+
+
+def triangles() -> Iterator[Case]:
+    """The ball of 10,000 triangles is the peer of the larger ones."""
+    camera = core.Camera(EYE, TARGET, vertical_fov_degrees=FOV, width=256, height=256)
+    first = 0.0
+    for segments in (100, 1000, 2236):
+        before = resident_megabytes()
+        start = time.perf_counter()
+        tracer = core.Tracer(
+            our_scene(core.make_sphere((0, 1, 0), 0.7, segments)),
+            core.TracerOptions(indirect=core.IndirectLight.none),
+        )
+        ready = time.perf_counter() - start
+        memory = resident_megabytes() - before
+        taken = seconds(partial(tracer.trace_beauty, camera, core.TraceOptions(samples_per_pixel=4)), 2)
+        first = first or taken
+        count = segments * segments
+        yield Case(
+            f"{count:,} triangles, ready in {ready:.2f} s, {memory:.0f} MB",
+            "s per image", taken, first, "10,000 triangles", 0.0, 0.0,
+        )  # fmt: skip
+
+
+def all_cases() -> Iterator[Case]:
+    yield from cases()
+    yield from scaling()
+    yield from triangles()
+
+
 if __name__ == "__main__":
-    run("Path tracing against Mitsuba 3.", cases)
+    run("Path tracing against Mitsuba 3.", all_cases)

@@ -1,6 +1,6 @@
-// Rays of the tracer against a bare Embree loop over the same rays and the same kind of BVH. Prints one JSON object
-// per case: {"case", "rays", "threads", "ours", "bare", "share"}, in million rays per second; `share` is ours / bare by
-// processor time, which other programs disturb less.
+// Rays of the tracer against a bare Embree loop over the same rays and the same kind of BVH. Prints one JSON
+// object per case: {"case", "rays", "threads", "ours", "bare", "share"}, in million rays per second; `share`
+// is ours / bare by processor time, which other programs disturb less.
 //
 // Both sides run on all threads, in turn; the best run counts. It ends with status 1 if the two disagree.
 

@@ -1,7 +1,7 @@
 """Images of the unbiased tracer against Mitsuba 3 on the same scenes, by a z-test on block means.
 
-Skipped unless Mitsuba is installed (`pip install mitsuba`). With MIRRORBAKE_LONG_TESTS=1 each image takes 4096 samples per
-pixel in place of 768.
+Skipped unless Mitsuba is installed (`pip install mitsuba`). With MIRRORBAKE_LONG_TESTS=1 each scene takes
+4096 samples per pixel in place of 768.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ class Twin:
 
     def sky(self, panorama: Any) -> None:
         self.scene.set_environment(panorama)
-        # Mitsuba's panorama has +Z at its centre, and its first and last row at the poles. Our interpolant, sampled on
-        # 16 times as many rows, is the same function up to the kinks between them.
+        # Mitsuba's panorama has +Z at its centre, and its first and last row at the poles. Our interpolant,
+        # sampled on 16 times as many rows, is the same function up to the kinks between them.
         height = len(panorama)
         v = np.linspace(0, 1, 16 * height + 1) * height - 0.5
         low = np.clip(np.floor(v).astype(int), 0, height - 1)

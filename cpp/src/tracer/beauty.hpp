@@ -57,7 +57,8 @@ class BeautySums {
   /// Samples traced per pixel of a tile.
   int samples(std::size_t tile) const { return samples_[tile]; }
 
-  /// Traces on, up to `samples` per pixel of the tile. `ray_through(row, point)` is the ray through a point of the image.
+  /// Traces on, up to `samples` per pixel of the tile. `ray_through(row, point)` is the ray through a point
+  /// of the image.
   template <typename RayThrough>
   void trace(const World& world, const RayScene::View& view, const TraceOptions& options, std::size_t tile,
              int samples, const RayThrough& ray_through) {

@@ -46,8 +46,8 @@ struct Gathered {
   bool dark_back_side = false;  ///< it hit the inside of a body, and no light was there
 };
 
-/// Follows specular reflection a few bounces. `irradiance_at(surface, u)` is the irradiance of a surface, u two random
-/// numbers.
+/// Follows specular reflection a few bounces. `irradiance_at(surface, u)` is the irradiance of a surface, u
+/// two random numbers.
 template <typename IrradianceAt>
 Gathered gather_along(const World& world, Ray ray, const SampleStream& stream,
                       const IrradianceAt& irradiance_at) {

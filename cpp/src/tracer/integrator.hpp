@@ -19,19 +19,22 @@ struct PathLimits {
   int diffuse_depth = 4;   ///< diffuse bounces of IndirectLight::path
 };
 
-/// Light that a surface sends towards `surface.view`, of that which does not arrive by a ray in its specular lobe.
+/// Light that a surface sends towards `surface.view`, of that which does not arrive by a ray in its specular
+/// lobe.
 struct ScatteredLight {
   glm::vec3 body{0.0F};  ///< radiance that the diffuse body reflects
-  /// What next-event estimation finds of the lights for a rough lobe, to be multiplied with `surface.fresnel`.
+  /// What next-event estimation finds of the lights for a rough lobe, to be multiplied with
+  /// `surface.fresnel`.
   glm::vec3 lobe{0.0F};
 };
 
-/// At the surface that is `bounce` specular bounces away from the eye. Shared by all integrators. `lobe` is 0 unless
-/// the path goes on with a specular bounce.
+/// At the surface that is `bounce` specular bounces away from the eye. Shared by all integrators. `lobe` is 0
+/// unless the path goes on with a specular bounce.
 ScatteredLight scattered_light(const World& world, const Surface& surface, const PathLimits& limits,
                                const SampleStream& stream, int bounce);
 
-/// A direction in the specular lobe. The radiance from there is multiplied with `weight` and `surface.fresnel`.
+/// A direction in the specular lobe. The radiance from there is multiplied with `weight` and
+/// `surface.fresnel`.
 struct SpecularBounce {
   glm::vec3 direction{0.0F};  ///< unit
   glm::vec3 weight{0.0F};     ///< 0 where the lobe reaches below the surface
@@ -41,15 +44,16 @@ SpecularBounce specular_bounce(const Surface& surface, glm::vec2 u);
 /// With the numbers for the surface `bounce` specular bounces away from the eye.
 SpecularBounce specular_bounce(const Surface& surface, const SampleStream& stream, int bounce);
 
-/// Emission of a light, of the sky or of `surface`, which the hit is on, towards the ray's origin. Where next-event
-/// estimation could have found it too it is weighted for a direction of density `pdf`; 0: it could not.
+/// Emission of a light, of the sky or of `surface`, which the hit is on, towards the ray's origin. Where
+/// next-event estimation could have found it too it is weighted for a direction of density `pdf`; 0: it could
+/// not.
 glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf);
 glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, const Surface& surface,
                         float pdf);
 
-/// The beauty integrator: radiance that arrives along `ray`, whose closest hit is `hit`, `bounce` specular bounces
-/// away from the eye, `pdf` the density of the ray's direction in a rough lobe (0: from the eye or a mirror).
-/// Reflections beyond the depth limit are black.
+/// The beauty integrator: radiance that arrives along `ray`, whose closest hit is `hit`, `bounce` specular
+/// bounces away from the eye, `pdf` the density of the ray's direction in a rough lobe (0: from the eye or a
+/// mirror). Reflections beyond the depth limit are black.
 glm::vec3 radiance(const World& world, const Ray& ray, const Hit& hit, const PathLimits& limits,
                    const SampleStream& stream, int bounce, float pdf);
 

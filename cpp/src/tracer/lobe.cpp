@@ -11,7 +11,8 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-// Trowbridge and Reitz: D = α² / (π (1 + (α² − 1) cos²θ)²), with sin²θ from x and y, which keeps its digits near the peak.
+// Trowbridge and Reitz: D = α² / (π (1 + (α² − 1) cos²θ)²), with sin²θ from x and y, which keeps its digits
+// near the peak.
 float ggx_distribution(float alpha, glm::vec3 h) {
   const float a2 = alpha * alpha;
   const float t = h.x * h.x + h.y * h.y + a2 * h.z * h.z;
@@ -46,8 +47,8 @@ float lobe_response(const LobeShape& shape, glm::vec3 view, glm::vec3 light) {
   if (!(view.z > 0.0F) || !(light.z > 0.0F)) return 0.0F;
   if (shape.lobe == SpecularLobe::phong) return phong_density(shape.exponent, view, light);
   // D G₁(v) G₁(l) / (4 cosθv cosθl) · cosθl, with G₁ = 2 cosθ/(cosθ + root).
-  const float denominator = (view.z + scaled_root(shape.roughness, view)) *
-                            (light.z + scaled_root(shape.roughness, light));
+  const float denominator =
+      (view.z + scaled_root(shape.roughness, view)) * (light.z + scaled_root(shape.roughness, light));
   return ggx_distribution(shape.roughness, half_vector(view, light)) * light.z / denominator;
 }
 

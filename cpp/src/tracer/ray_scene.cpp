@@ -15,8 +15,8 @@ namespace {
 // Objects beyond the 31st, and the lights, share the last bit of Embree's 32-bit ray masks.
 constexpr unsigned kSharedBit = 1U << 31;
 
-// Reflectors are what gets hidden most, and some objects are invisible to some rays: they are the first to get a bit
-// of their own.
+// Reflectors are what gets hidden most, and some objects are invisible to some rays: they are the first to
+// get a bit of their own.
 std::vector<unsigned> assign_mask_bits(const Scene& scene) {
   std::vector<unsigned> bits(scene.objects.size(), kSharedBit);
   const auto rank = [&](const Object& object) {

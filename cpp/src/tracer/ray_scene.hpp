@@ -27,8 +27,8 @@ inline constexpr std::uint32_t kNoGeometry = RTC_INVALID_GEOMETRY_ID;
 
 struct Hit {
   float distance = std::numeric_limits<float>::infinity();
-  /// Object number, or that of a light: object count + rectangle light number, or object count + rectangle light count +
-  /// sphere light number.
+  /// Object number, or that of a light: object count + rectangle light number, or object count + rectangle
+  /// light count + sphere light number.
   std::uint32_t geometry = kNoGeometry;
   std::uint32_t triangle = 0;
   float u = 0.0F;  ///< weight of the triangle's second vertex
@@ -37,9 +37,9 @@ struct Hit {
   bool missed() const { return geometry == kNoGeometry; }
 };
 
-/// The scene in Embree: one geometry per object, then one per rectangle light and per sphere light. Coordinates are
-/// relative to `origin`, so that a scene far from the world's origin is traced with the precision of one
-/// close to it.
+/// The scene in Embree: one geometry per object, then one per rectangle light and per sphere light.
+/// Coordinates are relative to `origin`, so that a scene far from the world's origin is traced with the
+/// precision of one close to it.
 class RayScene {
  public:
   explicit RayScene(const Scene& scene);

@@ -29,8 +29,8 @@ inline SampleStream sample_stream(std::uint64_t seed, std::uint64_t pixel, std::
   return {hash64(seed, pixel), index};
 }
 
-/// Where each use finds its numbers: for every bounce of the specular path that starts at the eye, the vertices of the
-/// diffuse path that leaves it there, and the uses at each of them.
+/// Where each use finds its numbers: for every bounce of the specular path that starts at the eye, the
+/// vertices of the diffuse path that leaves it there, and the uses at each of them.
 enum Dimension : std::uint32_t {
   camera_dimension = 0,   ///< of the first vertex
   rough_dimension = 0,    ///< direction in a rough lobe; the first vertex's is found one bounce on

@@ -14,7 +14,8 @@ namespace {
 // Light Transport Simulation and Rendering System, 2017, appendix A.3).
 constexpr float kLowestReflection = 0.01F;  // cosine to the geometric normal
 
-// A roughness texture may hold 0, where the lobe has no density; this one is narrower than float directions resolve.
+// A roughness texture may hold 0, where the lobe has no density; this one is narrower than float directions
+// resolve.
 constexpr float kSmoothest = 1e-4F;
 
 glm::vec3 reflect_about(glm::vec3 view, glm::vec3 n) { return 2.0F * glm::dot(n, view) * n - view; }

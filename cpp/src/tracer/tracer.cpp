@@ -182,7 +182,7 @@ Image Tracer::trace_beauty(const Camera& camera, const TraceOptions& options) co
   const glm::vec3 eye = camera.eye - world.rays.origin();
   const auto ray_through = [&](int, glm::vec2 point) { return Ray{eye, rays.direction(point)}; };
   return tracing::trace_image(world, world.rays.all(), camera.width,
-                     tracing::window_in(options, camera.width, camera.height), options, ray_through);
+                              tracing::window_in(options, camera.width, camera.height), options, ray_through);
 }
 
 BeautyTrace Tracer::trace_beauty_to_noise(const Camera& camera, float noise,

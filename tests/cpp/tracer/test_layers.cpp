@@ -99,7 +99,8 @@ Material rough(SpecularLobe lobe, FresnelModel fresnel) {
   return m;
 }
 
-// Rough lobes under lights of every kind: small and infinitely small ones are found by next-event estimation alone.
+// Rough lobes under lights of every kind: small and infinitely small ones are found by next-event estimation
+// alone.
 Scene room_with_all_lights() {
   Scene scene = small_room();
   scene.sphere_lights.push_back({{1.2F, 2.5F, 1.0F}, 0.15F, glm::vec3(20.0F)});
@@ -157,7 +158,8 @@ TEST(Layers, SharingLightsBetweenLobeAndNextEventEstimationKeepsTheMean) {
     TraceOptions options;
     options.samples_per_pixel = 256;
     const LayerTrace trace = tracer.trace_layers(camera, 0, options);
-    // The lobe's directions alone, sampled anew from the recorded surfaces, each with the lamp's full radiance.
+    // The lobe's directions alone, sampled anew from the recorded surfaces, each with the lamp's full
+    // radiance.
     double both = 0.0;
     double alone = 0.0;
     const LobeShape shape{SpecularLobe::ggx, roughness, 1.0F};
@@ -269,8 +271,8 @@ TEST(Layers, SeveralReflectorsInOnePassAreWhatTheyAreAlone) {
   EXPECT_THROW(tracer.trace_layers(room_camera(), twice, options), InvalidArgument);
 }
 
-// A bowl with a foot and a rim: what lies on the convex hull cannot meet the object again, smooth or rough; other triangles
-// do. The split is the proxy module's (spec G5).
+// A bowl with a foot and a rim: what lies on the convex hull cannot meet the object again, smooth or rough;
+// other triangles do. The split is the proxy module's (spec G5).
 TEST(Layers, PolygonsOnTheConvexHullHaveNoLocalLight) {
   for (const bool is_rough : {false, true}) {
     Scene scene = small_room();
@@ -296,8 +298,8 @@ TEST(Layers, PolygonsOnTheConvexHullHaveNoLocalLight) {
   }
 }
 
-// At the silhouette of the local reflection a pixel's α is the covered fraction of its samples, and the distant layer does
-// not know of the object: with or without a second body of it, it is the same.
+// At the silhouette of the local reflection a pixel's α is the covered fraction of its samples, and the
+// distant layer does not know of the object: with or without a second body of it, it is the same.
 TEST(Layers, LocalSilhouettesHaveFractionalAlphaOverAnUnchangedDistantLayer) {
   TriangleMesh plate = make_rectangle({-1, 0, 1}, {2, 0, 0}, {0, 0, -2});
   TriangleMesh both = plate;

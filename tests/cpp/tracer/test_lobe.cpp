@@ -96,8 +96,8 @@ TEST(Lobe, SamplesFollowTheDensity) {
       ++cells;
     }
     ASSERT_GT(cells, 5);
-    // χ² of n degrees of freedom exceeds n + 4√(2n) once in 10,000 or so; the midpoint rule adds up to 1 % per cell
-    // where the lobe is as narrow as a cell.
+    // χ² of n degrees of freedom exceeds n + 4√(2n) once in 10,000 or so; the midpoint rule adds up to 1 %
+    // per cell where the lobe is as narrow as a cell.
     EXPECT_LT(chi2, cells + 4.0 * std::sqrt(2.0 * cells) + 10.0);
     EXPECT_NEAR(rare_counted, rare_expected, 5.0 * std::sqrt(rare_expected + 10.0));
   }
@@ -190,8 +190,8 @@ TEST(Lobe, NarrowLobesAreMirrors) {
   }
 }
 
-// A rough ball under a white sky, traced, against the quadrature of its lobe: the estimator with both of its ways to
-// find light.
+// A rough ball under a white sky, traced, against the quadrature of its lobe: the estimator with both of its
+// ways to find light.
 TEST(Lobe, TracedFurnaceIsTheIntegralOfTheResponse) {
   for (const Case& c : {Case{ggx(0.4F), 0.6}, Case{ggx(1.0F), 0.9}, Case{phong(20.0F), 0.5}}) {
     SCOPED_TRACE(name(c));

@@ -18,15 +18,16 @@
 /// Ray tracing with Embree, which stays behind this header.
 namespace mirrorbake {
 
-/// Light that reaches a diffuse surface by way of other diffuse surfaces. `none` drops it. `cached` gathers it once
-/// per vertex of the static scene and interpolates: noise-free, blurred over a triangle's size, without caustics (the
-/// glow of a lamp that a mirror throws on a wall). `path` follows random paths: unbiased, noisy. Direct light
-/// is sampled at every point in all three.
+/// Light that reaches a diffuse surface by way of other diffuse surfaces. `none` drops it. `cached` gathers
+/// it once per vertex of the static scene and interpolates: noise-free, blurred over a triangle's size,
+/// without caustics (the glow of a lamp that a mirror throws on a wall). `path` follows random paths:
+/// unbiased, noisy. Direct light is sampled at every point in all three.
 enum class IndirectLight { none, cached, path };
 
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
-  /// Gather rays per vertex of the `cached` indirect light, 1…65536; a quarter of them after the first bounce.
+  /// Gather rays per vertex of the `cached` indirect light, 1…65536; a quarter of them after the first
+  /// bounce.
   int cache_rays = 64;
   int cache_bounces = 3;   ///< diffuse bounces that `cached` follows, 1…16
   std::uint64_t seed = 0;  ///< of the cache
@@ -56,26 +57,29 @@ struct TraceOptions {
 /// An image that was traced until its noise was below a limit.
 struct BeautyTrace {
   Image image;  ///< channels R, G, B
-  /// Standard error of a pixel's luminance relative to the luminance, root mean square over the image's tiles as the limit is applied to each.
+  /// Standard error of a pixel's luminance relative to the luminance, root mean square over the image's tiles
+  /// as the limit is applied to each.
   double noise = 0.0;
   double mean_samples_per_pixel = 0.0;
   double share_above = 0.0;  ///< of the tiles that samples_per_pixel ended before they reached the limit
 };
 
-/// The segmented layers of one reflector in one view ([PEM] §3, spec T4), averaged over each pixel: the channels are `R`,
-/// `G`, `B` for the beauty image, which has the surroundings too; `coverage`; `diffuse.R` …, `fresnel.R` …,
-/// `specular_local.R` … `specular_local.A`, `specular_distant.R` …, `distance`, `reflection.X` …, `normal.X` …,
-/// `position.X` …, means over the covered samples, 0 where there are none; `part`, the most frequent one, −1 for
-/// none; and `covariance.R` …. `distance` averages the finite ones, and is +inf where all are infinite.
+/// The segmented layers of one reflector in one view ([PEM] §3, spec T4), averaged over each pixel: the
+/// channels are `R`, `G`, `B` for the beauty image, which has the surroundings too; `coverage`; `diffuse.R`
+/// …, `fresnel.R` …, `specular_local.R` … `specular_local.A`, `specular_distant.R` …, `distance`,
+/// `reflection.X` …, `normal.X` …, `position.X` …, means over the covered samples, 0 where there are none;
+/// `part`, the most frequent one, −1 for none; and `covariance.R` …. `distance` averages the finite ones, and
+/// is +inf where all are infinite.
 ///
 /// Per sample, diffuse + fresnel · (local.rgb + (1 − local.a) · distant) is the beauty value up to float
-/// rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel: `covariance` is what has to be added
-/// to the same sum of means to get the mean beauty of the covered samples.
+/// rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel: `covariance` is what has
+/// to be added to the same sum of means to get the mean beauty of the covered samples.
 ///
-/// A rough reflector takes one direction of its lobe per sample. Its incident radiance is multiplied with the lobe's
-/// response for F = 1 over the direction's density, and with the Fresnel term of the facet over `fresnel`, which is that of the
-/// surface (spec T5). Lights that next-event estimation finds for the lobe are shared between the two ways by
-/// multiple importance sampling: the light's part is added to `distant`, and to `local` where α is 1.
+/// A rough reflector takes one direction of its lobe per sample. Its incident radiance is multiplied with the
+/// lobe's response for F = 1 over the direction's density, and with the Fresnel term of the facet over
+/// `fresnel`, which is that of the surface (spec T5). Lights that next-event estimation finds for the lobe
+/// are shared between the two ways by multiple importance sampling: the light's part is added to `distant`,
+/// and to `local` where α is 1.
 struct LayerTrace {
   Image layers;
   SurfaceSamples samples;  ///< with the traced light
@@ -90,8 +94,9 @@ struct RayHit {
   glm::vec3 normal{0.0F};    ///< unit geometric normal
 };
 
-/// A scene made ready for tracing. Construction validates the scene and builds the acceleration structures; all
-/// member functions are const and may run from several threads at once. Same arguments give the same bits on any number of threads.
+/// A scene made ready for tracing. Construction validates the scene and builds the acceleration structures;
+/// all member functions are const and may run from several threads at once. Same arguments give the same bits
+/// on any number of threads.
 class Tracer {
  public:
   explicit Tracer(Scene scene, const TracerOptions& options = {});
@@ -104,23 +109,25 @@ class Tracer {
   /// Image of everything, channels R, G, B.
   Image trace_beauty(const Camera& camera, const TraceOptions& options) const;
 
-  /// The same with as many samples as each tile of 16² pixels needs: 16, 32, 64 … until the standard error of its
-  /// pixels, root mean square, is at most `noise` (in (0, 1]) times the tile's mean luminance, or a tenth of the image's where that is
-  /// more; samples_per_pixel is the most it takes. The error is that of independent samples, which the stratified ones
-  /// undercut. What a tile has missed so far it cannot know of: rare bright paths are underestimated where it ends early.
+  /// The same with as many samples as each tile of 16² pixels needs: 16, 32, 64 … until the standard error of
+  /// its pixels, root mean square, is at most `noise` (in (0, 1]) times the tile's mean luminance, or a tenth
+  /// of the image's where that is more; samples_per_pixel is the most it takes. The error is that of
+  /// independent samples, which the stratified ones undercut. What a tile has missed so far it cannot know
+  /// of: rare bright paths are underestimated where it ends early.
   BeautyTrace trace_beauty_to_noise(const Camera& camera, float noise, const TraceOptions& options) const;
 
-  /// What the eye's rays meet first, channels `A` (coverage by objects), `Z` (depth along the view's axis in metres, +inf
-  /// where there is nothing), `normal.X` …, `position.X` …, `albedo.R` …, means over the covered samples, and `object`, the
-  /// number most samples have, −1 for none. By the same rays as trace_beauty with the same options.
+  /// What the eye's rays meet first, channels `A` (coverage by objects), `Z` (depth along the view's axis in
+  /// metres, +inf where there is nothing), `normal.X` …, `position.X` …, `albedo.R` …, means over the covered
+  /// samples, and `object`, the number most samples have, −1 for none. By the same rays as trace_beauty with
+  /// the same options.
   Image trace_geometry(const Camera& camera, const TraceOptions& options) const;
 
-  /// Layers of the object number `reflector`, whose material must be specular. Throws InvalidArgument for an eye inside
-  /// it: in its bounding box, most directions meeting the back of its surface first.
+  /// Layers of the object number `reflector`, whose material must be specular. Throws InvalidArgument for an
+  /// eye inside it: in its bounding box, most directions meeting the back of its surface first.
   LayerTrace trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const;
 
-  /// The same for several reflectors, all different, which share the rays from the eye: one LayerTrace each, with the same bits as
-  /// alone.
+  /// The same for several reflectors, all different, which share the rays from the eye: one LayerTrace each,
+  /// with the same bits as alone.
   std::vector<LayerTrace> trace_layers(const Camera& camera, std::span<const int> reflectors,
                                        const TraceOptions& options) const;
 
@@ -128,11 +135,12 @@ class Tracer {
   /// trace_layers with the same options.
   SurfaceSamples trace_visibility(const Camera& camera, int reflector, const TraceOptions& options) const;
 
-  /// The radiance that arrives at `origin`, as an environment map (spec T2): rays straight through the texels of the
-  /// projection, which pass through the objects in `hidden`. What the rays show still bears those objects' shadows and
-  /// reflections, as in the distant layer. A texel is the mean over its area in the map; beyond the rim of round maps
-  /// the projection goes on, as in resample(). Channels R, G, B, faces of width × height texels one below the other in one
-  /// image, in the order of EnvMapLayout. Throws InvalidArgument for sides outside 1…16384, or a cube that is not square.
+  /// The radiance that arrives at `origin`, as an environment map (spec T2): rays straight through the texels
+  /// of the projection, which pass through the objects in `hidden`. What the rays show still bears those
+  /// objects' shadows and reflections, as in the distant layer. A texel is the mean over its area in the map;
+  /// beyond the rim of round maps the projection goes on, as in resample(). Channels R, G, B, faces of width
+  /// × height texels one below the other in one image, in the order of EnvMapLayout. Throws InvalidArgument
+  /// for sides outside 1…16384, or a cube that is not square.
   Image capture(glm::vec3 origin, const Projection& projection, int width, int height,
                 std::span<const int> hidden, const TraceOptions& options) const;
 
@@ -140,19 +148,20 @@ class Tracer {
   Image capture_cube(glm::vec3 origin, int size, std::span<const int> hidden,
                      const TraceOptions& options) const;
 
-  /// First hits of arbitrary rays that pass through the objects in `hidden`. Throws InvalidArgument for a ray that is not finite or has no direction.
+  /// First hits of arbitrary rays that pass through the objects in `hidden`. Throws InvalidArgument for a ray
+  /// that is not finite or has no direction.
   std::vector<RayHit> intersect(std::span<const glm::vec3> origins, std::span<const glm::vec3> directions,
                                 std::span<const int> hidden) const;
 
-  /// The same into arrays of the rays' size, without normals: for those who have many rays. `object` is −1 for a miss and
-  /// for a light.
+  /// The same into arrays of the rays' size, without normals: for those who have many rays. `object` is −1
+  /// for a miss and for a light.
   void intersect(std::span<const glm::vec3> origins, std::span<const glm::vec3> directions,
                  std::span<const int> hidden, std::span<float> distance,
                  std::span<std::int32_t> object) const;
 
-  /// Irradiance (W m⁻²) on the front at every vertex of an object, all light included, the object itself taking part:
-  /// the view-independent diffuse layer. An average over the quarter of each adjacent triangle next to the
-  /// vertex, by `rays` (1…65536) samples; 0 at vertices without triangles.
+  /// Irradiance (W m⁻²) on the front at every vertex of an object, all light included, the object itself
+  /// taking part: the view-independent diffuse layer. An average over the quarter of each adjacent triangle
+  /// next to the vertex, by `rays` (1…65536) samples; 0 at vertices without triangles.
   std::vector<glm::vec3> vertex_irradiance(int object, int rays, std::uint64_t seed) const;
 
  private:

@@ -1,29 +1,57 @@
-"""Environment maps: conversions, mips and lookups against py360convert, SciPy and maketx.
+"""Environment maps: conversions, mips and lookups against py360convert, skylibs, SciPy, oiiotool and maketx.
 
-The panorama has twelve lights of 5e4, 1° to 2° wide, before a background of 0.1 to 1. For conversions to
+The synthetic panorama has twelve lights of 5e4, 1° to 2° wide, before a background of 0.1 to 1. For conversions to
 fewer texels the error is the relative L2 distance to the mean of the panorama over each texel, by 24² places
-in float64; for conversions to more texels it is the distance to the analytic background, without lights.
+in float64; for conversions to more texels it is the distance to the analytic background, without lights. A real panorama,
+from MIRRORBAKE_TEST_DATA, is halved before it is made larger, so that the original is the reference.
+
+py360convert keeps the coordinates of a conversion. "first" is what one conversion costs, with its caches cleared;
+"again" is any further one of the same sizes.
 """
 
+import importlib
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
-import py360convert
 import scipy.ndimage
 from numpy.typing import NDArray
 
 from benchmarks._report import Case, require, run, seconds
 from mirrorbake.envmap import EnvMap
-from mirrorbake.projection import points_from_directions, texel_directions
+from mirrorbake.projection import directions_from_points, points_from_directions, texel_directions
 
 FloatArray = NDArray[np.float32]
+Convert = Callable[[], FloatArray]
 PLACES = 24
 SUBSET = 32  # rows of each face that the reference looks at
+ROOT = Path(__file__).parents[1]
+
+
+def optional(name: str, package: str) -> ModuleType | None:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        print(f"bench: missing peer {name} (PyPI: {package})", file=sys.stderr)
+        return None
+
+
+def program(name: str) -> str | None:
+    path = shutil.which(name)
+    if path is None:
+        print(f"bench: missing peer {name} (Debian: openimageio-tools)", file=sys.stderr)
+    return path
+
+
+PY360CONVERT = optional("py360convert", "py360convert")
+SKYLIBS = optional("envmap", "skylibs")
 
 
 def background(d: NDArray[np.floating]) -> FloatArray:
@@ -43,22 +71,43 @@ def panorama(height: int, *, lights: bool) -> EnvMap:
     return EnvMap.from_array(image, "latlong")
 
 
-def mean_over_texels(source: EnvMap, size: int, face: int, rows: range) -> NDArray[np.float64]:
-    """Mean of a panorama over the area of some texels of a cube map, by many places of each."""
+def real_panorama() -> EnvMap | None:
+    folder = os.environ.get("MIRRORBAKE_TEST_DATA")
+    if not folder or not (Path(folder) / "venice.exr").is_file():
+        print("bench: no real panorama: MIRRORBAKE_TEST_DATA is not set", file=sys.stderr)
+        return None
+    return EnvMap.load(Path(folder) / "venice.exr")
+
+
+def halved(envmap: EnvMap) -> EnvMap:
+    image = envmap.level().astype(np.float64)
+    height, width, channels = image.shape
+    weight = np.cos(np.pi * ((np.arange(height) + 0.5) / height - 0.5))[:, None, None]
+    pairs = (image * weight).reshape(height // 2, 2, width // 2, 2, channels).sum((1, 3))
+    weights = np.broadcast_to(weight, (height, width, 1)).reshape(height // 2, 2, width // 2, 2, 1).sum((1, 3))
+    return EnvMap.from_array((pairs / weights).astype(np.float32), "latlong")
+
+
+def mean_over_texels(source: EnvMap, size: int, rows: range) -> NDArray[np.float64]:
+    """Mean of a panorama over the area of some rows of a cube map, by many places of each texel."""
     image = source.level()
     height, width = image.shape[:2]
     wide = size * PLACES
-    d = texel_directions("cube", wide, wide, face)[rows.start * PLACES : rows.stop * PLACES]
-    # The density of solid angle on a face is the cube of the normalised direction's largest component.
-    weight = np.abs(d).max(axis=-1).astype(np.float64) ** 3
-    _, points = points_from_directions("latlong", d)
-    column = np.minimum(((points[..., 0] + 1) / 2 * width).astype(int), width - 1)
-    row = np.minimum(((1 - points[..., 1]) / 2 * height).astype(int), height - 1)
-    values = image[row, column] * weight[..., None]
-    shape = (len(rows), PLACES, size, PLACES)
-    total: NDArray[np.float64] = values.reshape(*shape, 3).sum((1, 3))
-    mean: NDArray[np.float64] = total / weight.reshape(shape).sum((1, 3))[..., None]
-    return mean
+    means = []
+    across = (np.arange(size * PLACES) + 0.5) / (size * PLACES) * 2 - 1
+    for face in range(6):
+        for row in rows:
+            down = 1 - (np.arange(row * PLACES, (row + 1) * PLACES) + 0.5) / (size * PLACES) * 2
+            places = np.stack(np.meshgrid(across, down), axis=-1).astype(np.float32)
+            d = directions_from_points("cube", np.full(places.shape[:-1], face, np.int32), places)
+            # The density of solid angle on a face is the cube of the normalised direction's largest component.
+            weight = np.abs(d).max(axis=-1).astype(np.float64) ** 3
+            _, points = points_from_directions("latlong", d)
+            column = np.minimum(((points[..., 0] + 1) / 2 * width).astype(int), width - 1)
+            line = np.minimum(((1 - points[..., 1]) / 2 * height).astype(int), height - 1)
+            values = (image[line, column] * weight[..., None]).reshape(PLACES, size, PLACES, 3).sum((0, 2))
+            means.append(values / weight.reshape(PLACES, size, PLACES).sum((0, 2))[..., None])
+    return np.stack(means).reshape(6, len(rows), size, 3)
 
 
 def relative_l2(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
@@ -74,65 +123,174 @@ def as_our_cube(faces: FloatArray) -> FloatArray:
     return np.stack([px, nx, up[::-1], down[::-1], pz, nz])
 
 
-def conversions() -> Iterator[Case]:
+def their_cube(faces: FloatArray) -> list[FloatArray]:
+    px, nx, py, ny, pz, nz = faces
+    parts = [nz[:, ::-1], px[:, ::-1], pz[:, ::-1], nx[:, ::-1], py[::-1], ny[::-1]]
+    return [np.ascontiguousarray(part) for part in parts]
+
+
+def clear_py360convert() -> None:
+    assert PY360CONVERT is not None
+    utils = PY360CONVERT.utils
+    for owner in (utils, utils.EquirecSampler, utils.CubeFaceSampler):
+        for name in dir(owner):
+            clear = getattr(getattr(owner, name), "cache_clear", None)
+            if clear is not None:
+                clear()
+
+
+def first_seconds(convert: Convert, repetitions: int) -> float:
+    """Shortest time with py360convert's caches cleared."""
+    best = float("inf")
+    for _ in range(repetitions):
+        clear_py360convert()
+        start = time.perf_counter()
+        convert()
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def cross_index(size: int) -> tuple[NDArray[np.intp], ...]:
+    """Where skylibs' vertical cross holds the texels of our cube: rows and columns of shape (6, size, size)."""
+    assert SKYLIBS is not None
+    x, y, z, valid = SKYLIBS.EnvironmentMap(4 * size, "cube").worldCoordinates()
+    rows, columns = np.nonzero(np.asarray(valid, bool))
+    d = np.stack([x, y, z], axis=-1)[rows, columns].astype(np.float32)
+    face, points = points_from_directions("cube", d)
+    column = np.minimum(((points[:, 0] + 1) / 2 * size).astype(int), size - 1)
+    row = np.minimum(((1 - points[:, 1]) / 2 * size).astype(int), size - 1)
+    index = np.zeros((2, 6, size, size), np.intp)
+    index[:, face, row, column] = rows, columns
+    return tuple(index)
+
+
+def skylibs_convert(image: FloatArray, from_: str, to: str, size: int) -> Convert:
+    assert SKYLIBS is not None
+    source = SKYLIBS.EnvironmentMap(image, from_)
+
+    def convert() -> FloatArray:
+        return np.asarray(source.copy().convertTo(to, size).data)
+
+    return convert
+
+
+def to_cubes(
+    name: str, source: EnvMap, size: int, expected: NDArray[np.floating], rows: range, limit: float
+) -> Iterator[Case]:
+    """A panorama to a cube by every peer, `expected` in some rows of all faces."""
+    image = source.level()
+    height, width = image.shape[:2]
+    part = slice(rows.start, rows.stop)
+
+    def error(cube: FloatArray) -> float:
+        return relative_l2(cube[:, part], expected)
+
+    def ours(filter: str) -> Callable[[], EnvMap]:
+        return lambda: source.resample("cube", size, filter=filter)
+
+    times = {f: 1e3 * seconds(ours(f), 5) for f in ("automatic", "bilinear")}
+    errors = {f: error(ours(f)().level()) for f in times}
+    require(errors["automatic"] < limit, f"{name}: relative error {errors['automatic']:.2g}")
+    case = f"{name} {width}x{height} to cube {size}"
+    if PY360CONVERT is not None:
+        convert = PY360CONVERT.e2c
+
+        def peer() -> FloatArray:
+            return np.asarray(convert(image, size, mode="bilinear", cube_format="list"))
+
+        error_peer = error(as_our_cube(peer()))
+        first, again = 1e3 * first_seconds(peer, 3), 1e3 * seconds(peer, 3)
+        for filter, our_time in times.items():
+            for kind, time_peer in (("first", first), ("again", again)):
+                yield Case(
+                    f"{case}, {filter}", "ms", our_time, time_peer, f"py360convert {kind}", errors[filter], error_peer
+                )
+    if SKYLIBS is not None:
+        peer = skylibs_convert(image, "latlong", "cube", 4 * size)
+        error_peer = error(peer()[cross_index(size)])
+        time_peer = 1e3 * seconds(peer, 2)
+        for filter, our_time in times.items():
+            yield Case(f"{case}, {filter}", "ms", our_time, time_peer, "skylibs", errors[filter], error_peer)
+
+
+def synthetic_conversions() -> Iterator[Case]:
     source = panorama(1024, lights=True)
-    for size in (256, 1024):
-        shrinks = size == 256
-        if not shrinks:
-            source = panorama(1024, lights=False)
-        image = source.level()
+    rows = range(128 - SUBSET // 2, 128 + SUBSET // 2)
+    yield from to_cubes("lights", source, 256, mean_over_texels(source, 256, rows), rows, 0.02)
+    flux = float(np.abs(source.resample("cube", 256).flux() / source.flux() - 1).max())
+    require(flux < 1e-4, f"flux of the cube is off by {flux:.2g}")
+    source = panorama(1024, lights=False)
+    expected = np.stack([background(texel_directions("cube", 1024, 1024, face)) for face in range(6)])
+    yield from to_cubes("smooth", source, 1024, expected, range(1024), 0.02)
 
-        def convert(source: EnvMap = source, size: int = size) -> EnvMap:
-            return source.resample("cube", size)
 
-        def peer(image: FloatArray = image, size: int = size) -> FloatArray:
-            return np.asarray(py360convert.e2c(image, size, mode="bilinear", cube_format="list"))
-
-        ours = convert().level()
-        theirs = as_our_cube(peer())
-        if shrinks:
-            middle = range(size // 2 - SUBSET // 2, size // 2 + SUBSET // 2)
-            expected = np.stack([mean_over_texels(source, size, face, middle) for face in range(6)])
-            ours, theirs = (cube[:, middle.start : middle.stop] for cube in (ours, theirs))
-        else:
-            expected = np.stack([background(texel_directions("cube", size, size, face)) for face in range(6)])
-        errors = relative_l2(ours, expected), relative_l2(theirs, expected)
-        require(errors[0] < 0.02, f"cube of {size}: relative error {errors[0]:.2g}")
-        yield Case(
-            case=f"latlong 2048x1024 to cube {size}",
-            unit="ms",
-            ours=1e3 * seconds(convert, 3),
-            peer=1e3 * seconds(peer, 2),
-            peer_name="py360convert e2c, bilinear",
-            error_ours=errors[0],
-            error_peer=errors[1],
-        )
+def real_conversions() -> Iterator[Case]:
+    source = real_panorama()
+    if source is None:
+        return
+    yield from to_cubes("real", source, 64, mean_over_texels(source, 64, range(64)), range(64), 0.05)
+    rows = range(128 - SUBSET // 2, 128 + SUBSET // 2)
+    yield from to_cubes("real, halved,", halved(source), 256, mean_over_texels(source, 256, rows), rows, 0.5)
 
 
 def back_to_a_panorama() -> Iterator[Case]:
     cube = panorama(1024, lights=False).resample("cube", 256)
-    theirs_in = [np.ascontiguousarray(f) for f in _their_cube(cube.level())]
     expected = background(texel_directions("latlong", 1024, 512))
+    ours = 1e3 * seconds(lambda: cube.resample("latlong", 512), 5)
+    error_ours = relative_l2(cube.resample("latlong", 512).level(), expected)
+    require(error_ours < 0.02, f"cube to latlong: {error_ours}")
+    case = "cube 256 to latlong 1024x512"
+    if PY360CONVERT is not None:
+        faces = their_cube(cube.level())
+        convert = PY360CONVERT.c2e
+
+        def peer() -> FloatArray:
+            return np.asarray(convert(faces, 512, 1024, mode="bilinear", cube_format="list"))
+
+        error_peer = relative_l2(peer(), expected)
+        require(error_peer < 0.02, f"cube to latlong, py360convert: {error_peer}")
+        for kind, time_peer in (("first", first_seconds(peer, 3)), ("again", seconds(peer, 3))):
+            yield Case(case, "ms", ours, 1e3 * time_peer, f"py360convert {kind}", error_ours, error_peer)
+    if SKYLIBS is not None:
+        cross = np.zeros((1024, 768, 3), np.float32)
+        cross[cross_index(256)] = cube.level()
+        peer = skylibs_convert(cross, "cube", "latlong", 512)
+        error_peer = relative_l2(peer(), expected)
+        require(error_peer < 0.05, f"cube to latlong, skylibs: {error_peer}")
+        yield Case(case, "ms", ours, 1e3 * seconds(peer, 2), "skylibs", error_ours, error_peer)
+
+
+def to_round_maps() -> Iterator[Case]:
+    cube = panorama(1024, lights=False).resample("cube", 256)
+    size = 256
+    d = np.stack([texel_directions("dual_paraboloid", size, size, face) for face in (0, 1)])
+    expected = background(d)
 
     def peer() -> FloatArray:
-        return np.asarray(py360convert.c2e(theirs_in, 512, 1024, mode="bilinear", cube_format="list"))
+        face, points = points_from_directions("cube", d)
+        at = np.stack([face.ravel(), (1 - points[..., 1]).ravel() * 128 - 0.5, (points[..., 0] + 1).ravel() * 128 - 0.5])
+        channels = [scipy.ndimage.map_coordinates(c, at, order=1, mode="nearest") for c in np.moveaxis(cube.level(), -1, 0)]
+        return np.stack(channels, axis=-1).reshape(d.shape)
 
-    errors = relative_l2(cube.resample("latlong", 512).level(), expected), relative_l2(peer(), expected)
-    require(max(errors) < 0.02, f"cube to latlong: {errors}")
-    yield Case(
-        case="cube 256 to latlong 1024x512",
-        unit="ms",
-        ours=1e3 * seconds(lambda: cube.resample("latlong", 512), 3),
-        peer=1e3 * seconds(peer, 2),
-        peer_name="py360convert c2e, bilinear",
-        error_ours=errors[0],
-        error_peer=errors[1],
+    errors = relative_l2(cube.resample("dual_paraboloid", size).level(), expected), relative_l2(peer(), expected)
+    require(max(errors) < 0.02, f"cube to dual paraboloid: {errors}")
+    ours = 1e3 * seconds(lambda: cube.resample("dual_paraboloid", size), 5)
+    name = "SciPy map_coordinates, bilinear (neither peer has it)"
+    yield Case("cube 256 to dual paraboloid 256", "ms", ours, 1e3 * seconds(peer, 3), name, *errors)
+    if SKYLIBS is None:
+        return
+    source = panorama(512, lights=False)
+    convert = skylibs_convert(source.level(), "latlong", "angular", 512)
+    x, y = np.meshgrid((np.arange(512) + 0.5) / 256 - 1, 1 - (np.arange(512) + 0.5) / 256)
+    disc = x**2 + y**2 < 0.95
+    expected = background(texel_directions("angular", 512, 512))[disc]
+    errors = (
+        relative_l2(source.resample("angular", 512).level()[disc], expected),
+        relative_l2(convert()[disc], expected),
     )
-
-
-def _their_cube(faces: FloatArray) -> list[FloatArray]:
-    px, nx, py, ny, pz, nz = faces
-    return [nz[:, ::-1], px[:, ::-1], pz[:, ::-1], nx[:, ::-1], py[::-1], ny[::-1]]
+    require(max(errors) < 0.05, f"latlong to angular: {errors}")
+    ours = 1e3 * seconds(lambda: source.resample("angular", 512), 5)
+    yield Case("latlong 1024x512 to angular 512", "ms", ours, 1e3 * seconds(convert, 2), "skylibs", *errors)
 
 
 def lookups() -> Iterator[Case]:
@@ -172,45 +330,54 @@ def lookups() -> Iterator[Case]:
         )
 
 
-def mip_chain() -> Iterator[Case]:
-    if shutil.which("maketx") is None:
-        print("bench: without maketx (Debian: openimageio-tools)", file=sys.stderr)
+def our_tool() -> str | None:
+    folders = [os.environ.get("MIRRORBAKE_TOOLS", ""), *(ROOT / "build").glob("*/cpp/tools")]
+    found = [Path(folder) / "mb-envmap" for folder in folders if folder and (Path(folder) / "mb-envmap").is_file()]
+    if not found:
+        print("bench: mb-envmap is not built: cmake --build --preset release --target mb-envmap", file=sys.stderr)
+        return None
+    return str(max(found, key=lambda path: path.stat().st_mtime))
+
+
+def file_to_file() -> Iterator[Case]:
+    """One process each, from an EXR file to EXR files."""
+    tool, maketx, oiiotool = our_tool(), program("maketx"), program("oiiotool")
+    if tool is None:
         return
     source = panorama(1024, lights=True)
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "panorama.exr"
+        path, ours, theirs = (str(Path(folder) / name) for name in ("panorama.exr", "ours.exr", "theirs.exr"))
         source.save(path, format="float32")
-        command = ["maketx", "--envlatl", "--filter", "box", str(path), "-o", str(Path(folder) / "mips.exr")]
 
-        def peer() -> None:
-            subprocess.run(command, check=True, capture_output=True)
+        def command_seconds(*arguments: str) -> float:
+            return 1e3 * seconds(lambda: subprocess.run(arguments, check=True, capture_output=True), 3)
 
-        def ours() -> None:
-            mips = EnvMap.load(path).mips("solid_angle")
-            for level in range(mips.levels):
-                one = EnvMap.from_array(mips.level(level), "latlong")
-                one.save(Path(folder) / f"level{level}.exr")
-
-        mips = source.mips("solid_angle")
-        drift = max(float(np.abs(mips.flux(k) / mips.flux(0) - 1).max()) for k in range(mips.levels))
-        box = source.mips("box")
-        peer_drift = max(float(np.abs(box.flux(k) / box.flux(0) - 1).max()) for k in range(box.levels))
-        yield Case(
-            case="mips of latlong 2048x1024, file to file; error: drift of the flux",
-            unit="ms",
-            ours=1e3 * seconds(ours, 2),
-            peer=1e3 * seconds(peer, 2),
-            peer_name="maketx --envlatl (drift: of 2x2 means)",
-            error_ours=drift,
-            error_peer=peer_drift,
-        )
+        if oiiotool is not None:
+            expected = halved(source).level()
+            time_ours = command_seconds(tool, "convert", path, "--to", "latlong", "--size", "512", "--format", "float32", "-o", ours)
+            time_peer = command_seconds(oiiotool, path, "--resize:filter=box", "1024x512", "-o", theirs)
+            errors = [relative_l2(EnvMap.load(p).level(), expected) for p in (ours, theirs)]
+            require(max(errors) < 0.1, f"latlong to half its size: {errors}")
+            yield Case("latlong 2048x1024 to 1024x512, file to file", "ms", time_ours, time_peer, "oiiotool --resize, box", *errors)
+        if maketx is not None:
+            mips = source.mips("solid_angle")
+            box = source.mips("box")
+            drift = [float(np.abs(np.array([m.flux(k) / m.flux(0) - 1 for k in range(m.levels)])).max()) for m in (mips, box)]
+            time_ours = command_seconds(
+                tool, "mips", path, "--filter", "solid_angle", "--format", "half", "-o", str(Path(folder) / "level{}.exr")
+            )
+            time_peer = command_seconds(maketx, "--envlatl", "--filter", "box", "-d", "half", path, "-o", theirs)
+            name = "maketx --envlatl (drift: of 2x2 means)"
+            yield Case("mips of latlong 2048x1024, file to file; error: drift of the flux", "ms", time_ours, time_peer, name, *drift)
 
 
 def cases() -> Iterator[Case]:
-    yield from conversions()
+    yield from synthetic_conversions()
+    yield from real_conversions()
     yield from back_to_a_panorama()
+    yield from to_round_maps()
     yield from lookups()
-    yield from mip_chain()
+    yield from file_to_file()
 
 
 if __name__ == "__main__":

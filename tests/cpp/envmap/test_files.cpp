@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -20,6 +23,7 @@
 #include "mirrorbake/envmap/envmap_io.hpp"
 #include "mirrorbake/envmap/ktx2.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
+#include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
 #include "mirrorbake/image/half.hpp"
 
@@ -202,6 +206,45 @@ TEST_F(EnvMapFiles, ShapesThatFitNothingAreErrorsThatNameTheFile) {
 
 // Directions per convention, from the documentation or source of each program: centre, right edge of the right
 // quarter, top of its panorama.
+// Replaces the numbers of an EXR file's data and display windows by those of width × height.
+void claim_size(const std::string& path, std::int32_t width, std::int32_t height) {
+  std::string bytes;
+  {
+    std::ifstream in(path, std::ios::binary);
+    bytes.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  for (const std::string window : {"dataWindow", "displayWindow"}) {
+    const std::string attribute = window + std::string("\0box2i\0\x10\0\0\0", 11);
+    const std::size_t at = bytes.find(attribute);
+    ASSERT_NE(at, std::string::npos);
+    const std::int32_t box[4] = {0, 0, width - 1, height - 1};
+    std::memcpy(bytes.data() + at + attribute.size(), box, sizeof box);
+  }
+  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+// 60,000 × 30,000 are 21 GB, beyond the default limit; 60,000 × 4,000 are allowed, but the file ends first.
+TEST_F(EnvMapFiles, AHeaderThatClaims60000ColumnsIsAnErrorBeforeItsPixelsAreAllocated) {
+  for (const std::int32_t height : {30000, 4000}) {
+    save_envmap(path("wide.exr"), directions("latlong", 8, 4));
+    claim_size(path("wide.exr"), 60000, height);
+    EXPECT_THROW(load_envmap(path("wide.exr")), FileError) << height;
+  }
+}
+
+TEST_F(EnvMapFiles, SixtyThousandColumnsAreReadResampledAndSampled) {
+  EnvMap wide = make_envmap({parse_projection("latlong"), 60000, 2, 1, 1}, std::vector<std::string>{"Y"});
+  for (std::size_t i = 0; i < wide.values.size(); ++i) wide.values[i] = i % 60000 < 30000 ? 1.0F : 3.0F;
+  save_envmap(path("wide.exr"), wide);
+  const EnvMap read = load_envmap(path("wide.exr"), parse_projection("latlong"));
+  EXPECT_EQ(read.values, wide.values);
+  const EnvMap cube = resample(read, parse_projection("cube"), 16, 16);
+  // −X and +X are the two halves.
+  EXPECT_NEAR(cube.values[cube.layout.index(0, 1, 8, 8)], 1.0F, 1e-5F);
+  EXPECT_NEAR(cube.values[cube.layout.index(0, 0, 8, 8)], 3.0F, 1e-5F);
+  EXPECT_NEAR(integrate(cube)[0] / integrate(read)[0], 1.0, 1e-5);
+}
+
 TEST(Conventions, PanoramasLookWhereEachProgramLooks) {
   struct Case {
     const char* name;

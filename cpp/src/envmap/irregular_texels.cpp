@@ -45,10 +45,6 @@ bool is_straight(const Quad& quad, const StraightLimits& limits) {
          std::abs(cross(bend, p)) + std::abs(cross(bend, q)) <= limits.shift * std::abs(cross(p, q));
 }
 
-double side_length(const Quad& quad) {
-  return std::sqrt(0.5 * std::abs(cross(quad[2] - quad[0], quad[3] - quad[1])));
-}
-
 double interpolated_share(double side) { return std::clamp(4.0 - 4.0 * side, 0.0, 1.0); }
 
 DiscExtent disc_extent(ProjectionKind kind, glm::dvec2 low, glm::dvec2 high) {
@@ -64,9 +60,12 @@ DiscExtent disc_extent(ProjectionKind kind, glm::dvec2 low, glm::dvec2 high) {
 IrregularTexels::IrregularTexels(const ResampleJob& job)
     : job_(job),
       limits_(straight_limits(job.source.layout)),
+      limits_of_parts_(limits_),
       radiance_(static_cast<std::size_t>(job.source.layout.channels)),
       sample_(radiance_.size()),
-      point_(radiance_.size()) {}
+      point_(radiance_.size()) {
+  limits_of_parts_.per_length *= 1.5;
+}
 
 IrregularTexels::Corner IrregularTexels::corner(int face, double x, double y) const {
   const glm::dvec3 d = job_.direction(face, x, y);
@@ -100,7 +99,7 @@ void IrregularTexels::add(const float* values, double weight) {
 }
 
 // The texel as a quadrilateral in the plane of the source face of its first corner; nothing if it is not close to one.
-std::optional<Quad> IrregularTexels::regular_quad(const Corners& corners) const {
+std::optional<Quad> IrregularTexels::regular_quad(const Corners& corners, int depth) const {
   Quad quad;
   for (std::size_t i = 0; i < 4; ++i) {
     if (corners[i].face == corners[0].face) {
@@ -118,7 +117,8 @@ std::optional<Quad> IrregularTexels::regular_quad(const Corners& corners) const 
       if (p.x - quad[0].x < -0.5 * job_.width()) p.x += job_.width();
     }
   }
-  return is_straight(quad, limits_) ? std::optional<Quad>(quad) : std::nullopt;
+  return is_straight(quad, depth == 0 ? limits_ : limits_of_parts_) ? std::optional<Quad>(quad)
+                                                                    : std::nullopt;
 }
 
 void IrregularTexels::write(int face, glm::dvec2 low, glm::dvec2 high, float* result) {
@@ -126,9 +126,7 @@ void IrregularTexels::write(int face, glm::dvec2 low, glm::dvec2 high, float* re
   const Corners around = corners(face, low, high);
   const glm::dvec2 middle = 0.5 * (low + high);
   double share = 0.0;
-  if (job_.filter == ResampleFilter::automatic) {
-    if (const std::optional<Quad> quad = regular_quad(around)) share = interpolated_share(side_length(*quad));
-  }
+  if (job_.filter == ResampleFilter::automatic) share = interpolated_share(texels_across(face, low, high));
   if (share < 1.0) {
     std::fill(radiance_.begin(), radiance_.end(), 0.0);
     solid_angle_ = 0.0;
@@ -159,6 +157,19 @@ void IrregularTexels::write(int face, glm::dvec2 low, glm::dvec2 high, float* re
   for (std::size_t c = 0; c < sample_.size(); ++c) result[c] = static_cast<float>(sample_[c]);
 }
 
+// The length of a texel over that of the source's there, the longer one of the latter.
+double IrregularTexels::texels_across(int face, glm::dvec2 low, glm::dvec2 high) const {
+  const glm::dvec2 middle = 0.5 * (low + high);
+  const double area = std::abs((high.x - low.x) * (high.y - low.y));
+  const double length =
+      std::sqrt(area * solid_angle_density(job_.target.projection, face, middle.x, middle.y));
+  const MapPoint at = point_from_direction(job_.projection(), job_.direction(face, middle.x, middle.y));
+  const MapJacobian jacobian = map_jacobian(job_.projection(), at.face, at.x, at.y);
+  const double source =
+      std::max(2.0 / job_.width() * glm::length(jacobian.dx), 2.0 / job_.height() * glm::length(jacobian.dy));
+  return source > 0.0 ? length / source : 1.0;
+}
+
 void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, int depth) {
   const DiscExtent place =
       clipped_ ? disc_extent(job_.target.projection.kind, low, high) : DiscExtent::inside;
@@ -176,7 +187,7 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
     Corners seen = corners;
     // The face under consideration comes first, the order around the texel stays.
     while (seen[0].face != faces[f]) std::rotate(seen.begin(), seen.begin() + 1, seen.end());
-    const std::optional<Quad> quad = regular_quad(seen);
+    const std::optional<Quad> quad = regular_quad(seen, depth);
     regular = quad.has_value();
     if (regular) quads[f] = *quad;
   }

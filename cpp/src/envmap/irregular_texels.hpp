@@ -47,10 +47,7 @@ using Quad = std::array<glm::dvec2, 4>;
 StraightLimits straight_limits(const EnvMapLayout& source);
 bool is_straight(const Quad& quad, const StraightLimits& limits);
 
-/// Length of the side of a square of the same area.
-double side_length(const Quad& quad);
-
-/// How much of `automatic` is interpolation rather than area for texels of that side. At less than one texel of the
+/// How much of `automatic` is interpolation rather than area for texels that many of the source's long. At less than one texel of the
 /// source nothing is left to alias, so that the change is quick.
 double interpolated_share(double side);
 
@@ -84,13 +81,16 @@ class IrregularTexels {
   Corners corners(int face, glm::dvec2 low, glm::dvec2 high) const;
   bool covered(const Corner& corner) const;
   const float* texel(const Corner& corner) const;
-  std::optional<Quad> regular_quad(const Corners& corners) const;
+  std::optional<Quad> regular_quad(const Corners& corners, int depth) const;
+  double texels_across(int face, glm::dvec2 low, glm::dvec2 high) const;
   void add(const float* values, double weight);
   void gather(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, int depth);
   void gather_quad(int face, const Quad& quad);
 
   const ResampleJob& job_;
   const StraightLimits limits_;
+  // What one part of a texel loses by a straight edge the next one gets; only the texel's own edges matter.
+  StraightLimits limits_of_parts_;
   Coverage coverage_;
   bool clipped_ = false;
   std::vector<double> radiance_;  // times solid angle

@@ -96,8 +96,8 @@ class LineLookup {
     for (std::size_t i = 0; i < count; ++i) {
       const MapPoint point = point_from_direction(job_.projection(), {dx_[i], dy_[i], dz_[i]});
       const glm::dvec2 position = job_.position(point.x, point.y);
-      to.x[i] = position.x;
-      to.y[i] = position.y;
+      to.x[i] = std::clamp(position.x, 0.0, static_cast<double>(job_.width()));
+      to.y[i] = std::clamp(position.y, 0.0, static_cast<double>(job_.height()));
       to.face[i] = point.covered ? point.face : -1;
     }
   }

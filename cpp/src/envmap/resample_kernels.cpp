@@ -12,6 +12,9 @@ constexpr double kPi = 3.14159265358979323846;
 inline double magnitude(double v) { return __builtin_fabs(v); }
 inline double larger(double a, double b) { return a > b ? a : b; }
 
+// Rounding may put what lies on an edge a bit beyond it.
+inline double within(double v, double side) { return v > 0.0 ? (v < side ? v : side) : 0.0; }
+
 // Positions are above −2³⁰, where a conversion rounds towards zero.
 inline int floor_of(double v) {
   const int i = static_cast<int>(v);
@@ -58,7 +61,7 @@ void latlong_positions(const double* __restrict dx, const double* __restrict dy,
   for (std::size_t i = 0; i < count; ++i) {
     x[i] = (angle(dx[i], -dz[i]) + kPi) * per_longitude;
     const double across = __builtin_sqrt(dx[i] * dx[i] + dz[i] * dz[i]);
-    y[i] = (0.5 * kPi - angle(dy[i], across)) * per_latitude;
+    y[i] = within((0.5 * kPi - angle(dy[i], across)) * per_latitude, height);
     face[i] = 0;
   }
 }
@@ -82,8 +85,8 @@ void cube_positions(const double* __restrict dx, const double* __restrict dy, co
     const double t = by_z ? -dy[i] : by_y ? sign * dz[i] : -dy[i];
     const double size = by_z ? az : a;
     const double scale = 0.5 / (size > 0.0 ? size : 1.0);
-    x[i] = (0.5 + s * scale) * width;
-    y[i] = (0.5 + t * scale) * height;
+    x[i] = within((0.5 + s * scale) * width, width);
+    y[i] = within((0.5 + t * scale) * height, height);
     const double number = (by_z ? 4.0 : by_y ? 2.0 : 0.0) + (major < 0.0 ? 1.0 : 0.0);
     face[i] = static_cast<std::int32_t>(number);
   }
@@ -98,8 +101,8 @@ void dual_paraboloid_positions(const double* __restrict dx, const double* __rest
   for (std::size_t i = 0; i < count; ++i) {
     const double q = __builtin_sqrt(dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]) + magnitude(dz[i]);
     const double scale = 0.5 / (q > 0.0 ? q : 1.0);
-    x[i] = (0.5 + dx[i] * scale) * width;
-    y[i] = (0.5 - dy[i] * scale) * height;
+    x[i] = within((0.5 + dx[i] * scale) * width, width);
+    y[i] = within((0.5 - dy[i] * scale) * height, height);
     face[i] = dz[i] >= 0.0 ? 0 : 1;
   }
 }
@@ -124,7 +127,18 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
     const double cross = magnitude(px * qy - py * qx);
     const double shift = magnitude(bend_x * py - bend_y * px) + magnitude(bend_x * qy - bend_y * qx);
     const double longest = larger(larger(magnitude(px), magnitude(py)), larger(magnitude(qx), magnitude(qy)));
-    const double side = __builtin_sqrt(0.5 * cross);
+    // The image is as long and as wide as the singular values of the map, with half the diagonals as axes. A long one, as
+    // around a pole, is as fine as it is wide.
+    const double area = 0.5 * cross;
+    const double squares = 0.5 * (px * px + py * py + qx * qx + qy * qy);
+    const double discriminant = squares * squares - 4.0 * area * area;
+    const double length2 = 0.5 * (squares + __builtin_sqrt(larger(discriminant, 0.0)));
+    const double root = __builtin_sqrt(area);
+    const double wide = area / __builtin_sqrt(larger(length2, 1e-30));
+    double long_share = 2.0 * length2 / larger(area, 1e-30) - 4.0;
+    long_share = long_share > 0.0 ? long_share : 0.0;
+    long_share = long_share < 1.0 ? long_share : 1.0;
+    const double side = root + long_share * (wide - root);
     const bool straight =
         (magnitude(bend_x) + magnitude(bend_y) < larger(kStraightBend, per_length * longest)) &
         (shift <= most_shift * cross) & (longest < farthest) & (side > 1e-6);

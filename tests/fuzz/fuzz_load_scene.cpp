@@ -52,6 +52,7 @@ int fuzz_load_scene(const std::uint8_t* data, std::size_t size) {
   mirrorbake::SceneOptions options;
   options.meshes = {100'000, 100'000};
   options.max_texture_bytes = 64U << 20;
+  options.cache_textures_above = 64;
   try {
     mirrorbake::validate(mirrorbake::load_scene(scene.string(), options).scene);
   } catch (const mirrorbake::FileError&) {

@@ -285,6 +285,7 @@ void MaterialReader::set_colours(const Parameters& p, Material& result) {
         sum += image.pixels[i];
       metallic *=
           static_cast<float>(sum * static_cast<double>(channels) / static_cast<double>(image.pixels.size()));
+      reader_.release(image);
       warnings_.add(
           "textures of base colour and metallicity that are placed differently: the mean metallicity is "
           "used");
@@ -330,6 +331,8 @@ void MaterialReader::set_colours(const Parameters& p, Material& result) {
           return glm::mix(glm::vec3(p.dielectric_r0), p.base * b, metallic_at(mr));
         });
       });
+  if (base_image) reader_.release(*base_image);
+  if (mr_image) reader_.release(*mr_image);
 }
 
 // α is the square of the perceptual roughness.
@@ -344,6 +347,7 @@ void MaterialReader::set_roughness(const Parameters& p, Material& result) {
         const Image source = decode(p.metallic_roughness_use->image, Transfer::linear);
         Image image =
             combined(nullptr, &source, 1, [](glm::vec3, glm::vec3 mr) { return glm::vec3(mr.y * mr.y); });
+        reader_.release(source);
         reader_.reserve(path_, image.width, image.height, 1);
         Texture texture;
         texture.image = std::move(image);

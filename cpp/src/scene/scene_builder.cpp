@@ -79,6 +79,8 @@ void TextureReader::reserve(const std::string& name, int width, int height, int 
   bytes_ += size;
 }
 
+void TextureReader::release(const Image& image) { bytes_ -= image.pixels.size() * sizeof(float); }
+
 Image TextureReader::read(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
                           float* largest) {
   DecodeOptions decode;

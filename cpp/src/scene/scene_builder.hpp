@@ -43,6 +43,8 @@ class TextureReader {
 
   /// Takes room for a texture that is made here. Throws FileError(name) beyond the limits.
   void reserve(const std::string& name, int width, int height, int channels);
+  /// Gives the room of an image back that is not kept.
+  void release(const Image& image);
 
  private:
   const SceneOptions& options_;

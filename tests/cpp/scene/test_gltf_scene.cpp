@@ -401,7 +401,8 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
        texture(R"("textures":[{"source":0}],"images":[{"uri":"missing.png"}],)")},
       {"'../text.png', which is not inside",
        texture(R"("textures":[{"source":0}],"images":[{"uri":"../text.png"}],)")},
-      {"%2e/x.png: does not exist", texture(R"("textures":[{"source":0}],"images":[{"uri":"%252e/x.png"}],)")},
+      {"%2e/x.png: does not exist",
+       texture(R"("textures":[{"source":0}],"images":[{"uri":"%252e/x.png"}],)")},
       {"'/etc/passwd', which is not inside",
        texture(R"("textures":[{"source":0}],"images":[{"uri":"/etc/passwd"}],)")},
       {"image 0: is not an EXR",
@@ -482,6 +483,30 @@ TEST_F(GltfSceneFile, DecodedTexturesStayWithinTheLimits) {
   options = {};
   options.max_texture_side = 63;
   expect_error(document, "a.png: is too large: 64 x 64", options);
+}
+
+TEST_F(GltfSceneFile, ImagesThatAreOnlyMixedIntoOthersDoNotCount) {
+  png("a.png", 64, 64, std::vector<int>(64 * 64 * 3, 100));
+  Document document;
+  document.materials = R"([{"pbrMetallicRoughness":{"baseColorTexture":{"index":0},
+      "metallicRoughnessTexture":{"index":0}}}])";
+  document.extra = R"("textures":[{"source":0}],"images":[{"uri":"a.png"}],)";
+  SceneOptions options;
+  // Albedo and reflectance of three channels, roughness of one, and two images to make them from.
+  options.max_texture_bytes = (3 + 3 + 1 + 3 + 3) * 64 * 64 * sizeof(float);
+  EXPECT_EQ(load(document, options).scene.textures.size(), 3U);
+  options.max_texture_bytes = (3 + 3 + 3 + 3) * 64 * 64 * sizeof(float) - 1;
+  expect_error(document, "limit on decoded textures", options);
+}
+
+TEST_F(GltfSceneFile, AChainOfAHundredThousandNodesIsNoRecursion) {
+  Document document;
+  document.materials = "[{}]";
+  document.nodes = "[";
+  constexpr int kNodes = 100'000;
+  for (int i = 0; i + 1 < kNodes; ++i) document.nodes += R"({"children":[)" + std::to_string(i + 1) + "]},";
+  document.nodes += R"({"mesh":0}])";
+  EXPECT_EQ(load(document).scene.objects.size(), 1U);
 }
 
 TEST_F(GltfSceneFile, OneFileIsNotReadOverAndOver) {

@@ -191,6 +191,37 @@ def bake_command(
     messages.print(f"{out}: {summary.views} views{resumed}", markup=False, soft_wrap=True)
 
 
+@app.command("analyze")
+@reports_errors
+def analyze_command(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)],
+    tolerance: Annotated[
+        float,
+        typer.Option("--tolerance", help="Relative change of the images that is worth no further bounce."),
+    ] = 0.01,
+    json: Json = False,
+    threads: Threads = 0,
+) -> None:
+    """Tell which layers, bounces and map resolution a scene requires, and why."""
+    import json as json_module
+
+    from mirrorbake.analyze import analyze
+    from mirrorbake.config import load_config
+
+    limit = _core.ThreadLimit(threads)
+    analysis = analyze(load_config(scene, []), tolerance)
+    del limit
+    if json:
+        print(json_module.dumps(analysis.to_json()))
+        return
+    for layer in analysis.layers:
+        print(f"{layer.subject:8} {'yes' if layer.needed else 'no':4} {layer.reason}")
+    for subject, value, reason in zip(
+        ("depth", "maps.size"), (analysis.depth, analysis.map_size), analysis.reasons, strict=True
+    ):
+        print(f"{subject:9}{value:<5}{reason}")
+
+
 @app.command("evaluate")
 @reports_errors
 def evaluate_command(directory: Folder, json: Json = False, threads: Threads = 0) -> None:

@@ -323,6 +323,18 @@ def test_an_obj_scene_has_its_materials(tmp_path: Path) -> None:
     assert (material.lobe, material.exponent) == (mirrorbake.SpecularLobe.phong, 50.0)
 
 
+def test_text_of_another_encoding_does_not_get_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_bytes(b"newmtl K\xe4nnchen\nK\xe4 1\n")
+    path = tmp_path / "a.obj"
+    path.write_bytes(b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\no K\xe4nnchen\nusemtl K\xe4nnchen\nf 1 2 3\n")
+    loaded = mirrorbake.load_scene(str(path))
+    assert loaded.scene.object_names == loaded.scene.material_names == ["K\ufffdnnchen"]
+    assert [w.message for w in loaded.warnings] == ["MTL keyword K\ufffd is not supported"]
+    path.write_bytes(b"v 0 0 \xe4\n")
+    with pytest.raises(mirrorbake.FileError, match="line 1 has '\ufffd'"):
+        mirrorbake.load_scene(str(path))
+
+
 def test_what_is_wrong_with_a_scene_file_is_named(tmp_path: Path) -> None:
     path = tiny_room(tmp_path / "room.glb", shiny=MATTE)
     with pytest.raises(mirrorbake.FileError, match=r"room\.glb: .*too large: 32 x 32"):

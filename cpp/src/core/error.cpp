@@ -1,12 +1,17 @@
 #include "mirrorbake/core/error.hpp"
 
+#include <initializer_list>
+#include <string>
+
+#include "mirrorbake/core/text.hpp"
+
 namespace mirrorbake {
 namespace {
 
 std::string join(std::initializer_list<std::string_view> parts) {
   std::string text;
   for (std::string_view part : parts) text += part;
-  return text;
+  return valid_utf8(text);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake::mtl {
 namespace {
@@ -176,7 +177,7 @@ std::vector<Definition> parse(const std::string& path, std::string_view text, Wa
 Material material_from(const std::string& path, const Definition& definition, Warnings& warnings) {
   const std::string where = "material '" + definition.name + "' ";
   Material material;
-  material.name = definition.name;
+  material.name = valid_utf8(definition.name);
   const glm::vec3 default_diffuse = definition.diffuse_map.file.empty() ? glm::vec3(0.5F) : glm::vec3(1.0F);
   material.albedo = reflectance(path, where + "Kd", definition.diffuse.value_or(default_diffuse), warnings);
   material.albedo_texture = definition.diffuse_map.transform;

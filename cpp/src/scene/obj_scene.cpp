@@ -9,6 +9,7 @@
 #include "file_bytes.hpp"
 #include "loaded_mesh.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mtl.hpp"
 #include "scene_builder.hpp"
 
@@ -95,7 +96,7 @@ class ObjScene {
     if (it == definitions_.end()) {
       warnings_.add("the material '" + name + "' is not defined");
       Material material = unnamed();
-      material.name = name;
+      material.name = valid_utf8(name);
       return material;
     }
     const mtl::Definition& definition = it->second.definition;

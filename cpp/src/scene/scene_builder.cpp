@@ -8,6 +8,7 @@
 
 #include "file_bytes.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -63,7 +64,7 @@ TriangleMesh submesh(const TriangleMesh& mesh, const std::vector<Range>& ranges,
 void Warnings::add(const std::string& message) {
   const auto [it, is_new] = index_.emplace(message, warnings_.size());
   if (is_new) {
-    warnings_.push_back({message, 1});
+    warnings_.push_back({valid_utf8(message), 1});
   } else {
     ++warnings_[it->second].count;
   }
@@ -171,7 +172,7 @@ std::vector<Object> split_into_objects(LoadedMesh&& loaded, const std::vector<Ma
   for (const Piece& piece : pieces) {
     Object object;
     object.material = material_of.at(piece.group->material);
-    std::string name = piece.group->name.empty() ? "object" : piece.group->name;
+    std::string name = piece.group->name.empty() ? "object" : valid_utf8(piece.group->name);
     if (pieces_of_owner[piece.group->owner] > 1) {
       name += "/" + materials[static_cast<std::size_t>(object.material)].name;
     }

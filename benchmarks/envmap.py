@@ -1,9 +1,9 @@
 """Environment maps: conversions, mips and lookups against py360convert, skylibs, SciPy, oiiotool and maketx.
 
-The synthetic panorama has twelve lights of 5e4, 1° to 2° wide, before a background of 0.1 to 1. For conversions to
-fewer texels the error is the relative L2 distance to the mean of the panorama over each texel, by 24² places
-in float64; for conversions to more texels it is the distance to the analytic background, without lights. A real panorama,
-from MIRRORBAKE_TEST_DATA, is halved before it is made larger, so that the original is the reference.
+The synthetic panorama has twelve lights of 5e4, 1° to 2° wide, before a background of 0.1 to 1. For conversions
+to fewer texels the error is the relative L2 distance to the mean of the panorama over each texel, by 24² places
+in float64; for smooth ones it is the distance to the analytic background, without lights. A real
+panorama, from MIRRORBAKE_TEST_DATA, is halved before it is made larger, so that the original is the reference.
 
 py360convert keeps the coordinates of a conversion. "first" is what one conversion costs, with its caches cleared;
 "again" is any further one of the same sizes.
@@ -84,7 +84,9 @@ def halved(envmap: EnvMap) -> EnvMap:
     height, width, channels = image.shape
     weight = np.cos(np.pi * ((np.arange(height) + 0.5) / height - 0.5))[:, None, None]
     pairs = (image * weight).reshape(height // 2, 2, width // 2, 2, channels).sum((1, 3))
-    weights = np.broadcast_to(weight, (height, width, 1)).reshape(height // 2, 2, width // 2, 2, 1).sum((1, 3))
+    weights = (
+        np.broadcast_to(weight, (height, width, 1)).reshape(height // 2, 2, width // 2, 2, 1).sum((1, 3))
+    )
     return EnvMap.from_array((pairs / weights).astype(np.float32), "latlong")
 
 
@@ -92,7 +94,6 @@ def mean_over_texels(source: EnvMap, size: int, rows: range) -> NDArray[np.float
     """Mean of a panorama over the area of some rows of a cube map, by many places of each texel."""
     image = source.level()
     height, width = image.shape[:2]
-    wide = size * PLACES
     means = []
     across = (np.arange(size * PLACES) + 0.5) / (size * PLACES) * 2 - 1
     for face in range(6):
@@ -100,7 +101,7 @@ def mean_over_texels(source: EnvMap, size: int, rows: range) -> NDArray[np.float
             down = 1 - (np.arange(row * PLACES, (row + 1) * PLACES) + 0.5) / (size * PLACES) * 2
             places = np.stack(np.meshgrid(across, down), axis=-1).astype(np.float32)
             d = directions_from_points("cube", np.full(places.shape[:-1], face, np.int32), places)
-            # The density of solid angle on a face is the cube of the normalised direction's largest component.
+            # The density of solid angle is the cube of the normalised direction's largest component.
             weight = np.abs(d).max(axis=-1).astype(np.float64) ** 3
             _, points = points_from_directions("latlong", d)
             column = np.minimum(((points[..., 0] + 1) / 2 * width).astype(int), width - 1)
@@ -108,6 +109,14 @@ def mean_over_texels(source: EnvMap, size: int, rows: range) -> NDArray[np.float
             values = (image[line, column] * weight[..., None]).reshape(PLACES, size, PLACES, 3).sum((0, 2))
             means.append(values / weight.reshape(PLACES, size, PLACES).sum((0, 2))[..., None])
     return np.stack(means).reshape(6, len(rows), size, 3)
+
+
+def mean_background(projection: str, width: int, height: int, face: int = 0) -> NDArray[np.float64]:
+    """Mean of the analytic background over texels, by 4² places in each."""
+    d = texel_directions(projection, 4 * width, 4 * height, face)
+    places = background(d).astype(np.float64).reshape(height, 4, width, 4, 3)
+    mean: NDArray[np.float64] = places.mean((1, 3))
+    return mean
 
 
 def relative_l2(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
@@ -151,7 +160,7 @@ def first_seconds(convert: Convert, repetitions: int) -> float:
 
 
 def cross_index(size: int) -> tuple[NDArray[np.intp], ...]:
-    """Where skylibs' vertical cross holds the texels of our cube: rows and columns of shape (6, size, size)."""
+    """Rows and columns, (6, size, size) each, of our cube's texels in skylibs' vertical cross."""
     assert SKYLIBS is not None
     x, y, z, valid = SKYLIBS.EnvironmentMap(4 * size, "cube").worldCoordinates()
     rows, columns = np.nonzero(np.asarray(valid, bool))
@@ -203,7 +212,13 @@ def to_cubes(
         for filter, our_time in times.items():
             for kind, time_peer in (("first", first), ("again", again)):
                 yield Case(
-                    f"{case}, {filter}", "ms", our_time, time_peer, f"py360convert {kind}", errors[filter], error_peer
+                    f"{case}, {filter}",
+                    "ms",
+                    our_time,
+                    time_peer,
+                    f"py360convert {kind}",
+                    errors[filter],
+                    error_peer,
                 )
     if SKYLIBS is not None:
         peer = skylibs_convert(image, "latlong", "cube", 4 * size)
@@ -235,7 +250,7 @@ def real_conversions() -> Iterator[Case]:
 
 def back_to_a_panorama() -> Iterator[Case]:
     cube = panorama(1024, lights=False).resample("cube", 256)
-    expected = background(texel_directions("latlong", 1024, 512))
+    expected = mean_background("latlong", 1024, 512)
     ours = 1e3 * seconds(lambda: cube.resample("latlong", 512), 5)
     error_ours = relative_l2(cube.resample("latlong", 512).level(), expected)
     require(error_ours < 0.02, f"cube to latlong: {error_ours}")
@@ -264,15 +279,23 @@ def to_round_maps() -> Iterator[Case]:
     cube = panorama(1024, lights=False).resample("cube", 256)
     size = 256
     d = np.stack([texel_directions("dual_paraboloid", size, size, face) for face in (0, 1)])
-    expected = background(d)
+    expected = np.stack([mean_background("dual_paraboloid", size, size, face) for face in (0, 1)])
 
     def peer() -> FloatArray:
         face, points = points_from_directions("cube", d)
-        at = np.stack([face.ravel(), (1 - points[..., 1]).ravel() * 128 - 0.5, (points[..., 0] + 1).ravel() * 128 - 0.5])
-        channels = [scipy.ndimage.map_coordinates(c, at, order=1, mode="nearest") for c in np.moveaxis(cube.level(), -1, 0)]
+        at = np.stack(
+            [face.ravel(), (1 - points[..., 1]).ravel() * 128 - 0.5, (points[..., 0] + 1).ravel() * 128 - 0.5]
+        )
+        channels = [
+            scipy.ndimage.map_coordinates(c, at, order=1, mode="nearest")
+            for c in np.moveaxis(cube.level(), -1, 0)
+        ]
         return np.stack(channels, axis=-1).reshape(d.shape)
 
-    errors = relative_l2(cube.resample("dual_paraboloid", size).level(), expected), relative_l2(peer(), expected)
+    errors = (
+        relative_l2(cube.resample("dual_paraboloid", size).level(), expected),
+        relative_l2(peer(), expected),
+    )
     require(max(errors) < 0.02, f"cube to dual paraboloid: {errors}")
     ours = 1e3 * seconds(lambda: cube.resample("dual_paraboloid", size), 5)
     name = "SciPy map_coordinates, bilinear (neither peer has it)"
@@ -283,7 +306,7 @@ def to_round_maps() -> Iterator[Case]:
     convert = skylibs_convert(source.level(), "latlong", "angular", 512)
     x, y = np.meshgrid((np.arange(512) + 0.5) / 256 - 1, 1 - (np.arange(512) + 0.5) / 256)
     disc = x**2 + y**2 < 0.95
-    expected = background(texel_directions("angular", 512, 512))[disc]
+    expected = mean_background("angular", 512, 512)[disc]
     errors = (
         relative_l2(source.resample("angular", 512).level()[disc], expected),
         relative_l2(convert()[disc], expected),
@@ -331,10 +354,13 @@ def lookups() -> Iterator[Case]:
 
 
 def our_tool() -> str | None:
-    folders = [os.environ.get("MIRRORBAKE_TOOLS", ""), *(ROOT / "build").glob("*/cpp/tools")]
-    found = [Path(folder) / "mb-envmap" for folder in folders if folder and (Path(folder) / "mb-envmap").is_file()]
+    folders = [Path(os.environ.get("MIRRORBAKE_TOOLS", "-")), *(ROOT / "build").glob("*/cpp/tools")]
+    found = [folder / "mb-envmap" for folder in folders if (folder / "mb-envmap").is_file()]
     if not found:
-        print("bench: mb-envmap is not built: cmake --build --preset release --target mb-envmap", file=sys.stderr)
+        print(
+            "bench: mb-envmap is not built: cmake --build --preset release --target mb-envmap",
+            file=sys.stderr,
+        )
         return None
     return str(max(found, key=lambda path: path.stat().st_mtime))
 
@@ -354,21 +380,50 @@ def file_to_file() -> Iterator[Case]:
 
         if oiiotool is not None:
             expected = halved(source).level()
-            time_ours = command_seconds(tool, "convert", path, "--to", "latlong", "--size", "512", "--format", "float32", "-o", ours)
+            time_ours = command_seconds(
+                tool, "convert", path, "--to", "latlong", "--size", "512", "--format", "float32", "-o", ours
+            )
             time_peer = command_seconds(oiiotool, path, "--resize:filter=box", "1024x512", "-o", theirs)
             errors = [relative_l2(EnvMap.load(p).level(), expected) for p in (ours, theirs)]
             require(max(errors) < 0.1, f"latlong to half its size: {errors}")
-            yield Case("latlong 2048x1024 to 1024x512, file to file", "ms", time_ours, time_peer, "oiiotool --resize, box", *errors)
+            yield Case(
+                "latlong 2048x1024 to 1024x512, file to file",
+                "ms",
+                time_ours,
+                time_peer,
+                "oiiotool --resize, box",
+                *errors,
+            )
         if maketx is not None:
             mips = source.mips("solid_angle")
             box = source.mips("box")
-            drift = [float(np.abs(np.array([m.flux(k) / m.flux(0) - 1 for k in range(m.levels)])).max()) for m in (mips, box)]
+            drift = [
+                float(np.abs(np.array([m.flux(k) / m.flux(0) - 1 for k in range(m.levels)])).max())
+                for m in (mips, box)
+            ]
             time_ours = command_seconds(
-                tool, "mips", path, "--filter", "solid_angle", "--format", "half", "-o", str(Path(folder) / "level{}.exr")
+                tool,
+                "mips",
+                path,
+                "--filter",
+                "solid_angle",
+                "--format",
+                "half",
+                "-o",
+                str(Path(folder) / "level{}.exr"),
             )
-            time_peer = command_seconds(maketx, "--envlatl", "--filter", "box", "-d", "half", path, "-o", theirs)
+            time_peer = command_seconds(
+                maketx, "--envlatl", "--filter", "box", "-d", "half", path, "-o", theirs
+            )
             name = "maketx --envlatl (drift: of 2x2 means)"
-            yield Case("mips of latlong 2048x1024, file to file; error: drift of the flux", "ms", time_ours, time_peer, name, *drift)
+            yield Case(
+                "mips of latlong 2048x1024, file to file; error: drift of the flux",
+                "ms",
+                time_ours,
+                time_peer,
+                name,
+                *drift,
+            )
 
 
 def cases() -> Iterator[Case]:

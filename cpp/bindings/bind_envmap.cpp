@@ -13,6 +13,7 @@
 #include "mirrorbake/envmap/envmap.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
 #include "mirrorbake/envmap/footprint.hpp"
+#include "mirrorbake/envmap/half_envmap.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/envmap/sampling.hpp"
@@ -79,6 +80,22 @@ void bind_envmap(nb::module_& m) {
       },
       nb::arg("layout"), nb::arg("values"), nb::arg("level") = 0,
       "Sum of value times solid angle over the sphere, per channel.");
+  m.def(
+      "half_from_float",
+      [](const EnvMapLayout& layout, FloatArray values) {
+        std::size_t clamped = 0;
+        HalfEnvMap half;
+        {
+          nb::gil_scoped_release released;
+          half = half_from_float(view(layout, values), &clamped);
+        }
+        const std::size_t count = half.values.size();
+        return nb::make_tuple(to_numpy(std::move(half.values), {count}), clamped);
+      },
+      nb::arg("layout"), nb::arg("values"),
+      nb::sig("def half_from_float(layout: EnvMapLayout, values: NDArray[numpy.float32]) -> "
+              "tuple[NDArray[numpy.uint16], int]"),
+      "The bits of all values as IEEE 754 binary16, and how many were clamped to 65504.");
   m.def(
       "resample",
       [](const EnvMapLayout& layout, FloatArray values, const std::string& projection, int width, int height,

@@ -1174,6 +1174,11 @@ def full_level_count(width: int, height: int) -> int:
 def integrate(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], level: int = 0) -> list[float]:
     """Sum of value times solid angle over the sphere, per channel."""
 
+def half_from_float(layout: EnvMapLayout, values: NDArray[numpy.float32]) -> tuple[NDArray[numpy.uint16], int]:
+    """
+    The bits of all values as IEEE 754 binary16, and how many were clamped to 65504.
+    """
+
 def resample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], projection: str, width: int, height: int, filter: str, source_from_target: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
     """The finest level in another projection and size: a block of one level."""
 

@@ -127,6 +127,18 @@ class EnvMap:
         shape = (self.layout.level_height(index), self.layout.level_width(index), self.layout.channels)
         return block.reshape((self.layout.faces, *shape) if self.layout.faces > 1 else shape)
 
+    def half(self) -> tuple[NDArray[np.float16], int]:
+        """Return the block in half the memory, and how many values were clamped to ±65504.
+
+        `from_array` takes a level of it back, exactly.
+
+        >>> values, clamped = EnvMap.from_array(np.full((1, 2, 1), 1e6, np.float32), "latlong").half()
+        >>> values.tolist(), clamped
+        ([65504.0, 65504.0], 2)
+        """
+        bits, clamped = _core.half_from_float(self.layout, self.values)
+        return bits.view(np.float16), clamped
+
     def resample(
         self,
         projection: str,

@@ -165,3 +165,13 @@ def test_pixel_footprints() -> None:
     # Turning the normal by an angle turns the reflection by twice that.
     turned = _core.reflected_differential((0, 0, -1), (0, 0, 1), (0, 0, 0), (0.01, 0, 0))
     np.testing.assert_allclose(turned, (0.02, 0, 0), atol=1e-6)
+
+
+def test_half_is_what_numpy_rounds_to_but_for_what_it_cannot_hold() -> None:
+    values = np.random.default_rng(4).normal(scale=1e3, size=(2, 5, 5, 4)).astype(np.float32)
+    values[0, 0, 0] = [1e9, -1e9, 65504, 3e-8]
+    half, clamped = EnvMap.from_array(values, "dual_paraboloid").half()
+    assert clamped == 2
+    np.testing.assert_array_equal(half, np.clip(values, -65504, 65504).astype(np.float16).ravel())
+    again = EnvMap.from_array(half.reshape(values.shape), "dual_paraboloid")
+    np.testing.assert_array_equal(again.values, half.astype(np.float32))

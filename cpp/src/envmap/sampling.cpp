@@ -1,6 +1,7 @@
 #include "mirrorbake/envmap/sampling.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <string>
@@ -43,6 +44,24 @@ TexelDifferentials texel_differentials(const EnvMapLayout& layout, const MapPoin
     return texels;
   };
   return {solve(ddx), solve(ddy)};
+}
+
+// A Gaussian of the squared radius that has fallen to e⁻² at the rim of the ellipse, r² = 1, and is cut there, from a
+// table: within 8e-6, as Heckbert 1989 has it.
+double ellipse_weight(double r2) {
+  constexpr double kFalloff = 2.0;
+  constexpr std::size_t kSteps = 256;
+  static const std::array<double, kSteps + 2> table = [] {
+    std::array<double, kSteps + 2> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = std::exp(-kFalloff * static_cast<double>(i) / kSteps) - std::exp(-kFalloff);
+    }
+    return values;
+  }();
+  const double place = r2 * kSteps;
+  const auto i = static_cast<std::size_t>(place);
+  const double fraction = place - static_cast<double>(i);
+  return (1.0 - fraction) * table[i] + fraction * table[i + 1];
 }
 
 struct Sampler {
@@ -127,22 +146,31 @@ struct Sampler {
     const glm::dvec2 center = position(point, level) - 0.5;
     const double radius_x = std::sqrt(xx);
     const double radius_y = std::sqrt(yy);
-    // A Gaussian that has fallen to e⁻² at the rim of the ellipse and is cut there.
-    constexpr double kFalloff = 2.0;
-    const double at_rim = std::exp(-kFalloff);
+    const double per_determinant = 1.0 / determinant;
+    const int width = map.layout.level_width(level);
+    const int height = map.layout.level_height(level);
+    const int top = static_cast<int>(std::ceil(center.y - radius_y));
+    const int left = static_cast<int>(std::ceil(center.x - radius_x));
+    const bool on_face = top >= 0 && left >= 0 && center.y + radius_y < height && center.x + radius_x < width;
+    const std::size_t face = map.layout.index(level, point.face, 0, 0);
     double weight = 0.0;
     std::fill(result.begin(), result.end(), 0.0);
-    for (int row = static_cast<int>(std::ceil(center.y - radius_y)); row <= center.y + radius_y; ++row) {
+    for (int row = top; row <= center.y + radius_y; ++row) {
       const double y = row - center.y;
-      for (int column = static_cast<int>(std::ceil(center.x - radius_x)); column <= center.x + radius_x;
-           ++column) {
+      for (int column = left; column <= center.x + radius_x; ++column) {
         const double x = column - center.x;
-        const double r2 = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant;
+        const double r2 = (yy * x * x - 2.0 * xy * x * y + xx * y * y) * per_determinant;
         if (r2 >= 1.0) continue;
-        const double w = std::exp(-kFalloff * r2) - at_rim;
-        const float* texel = map.values.data() + texel_at(map.layout, level, point.face, row, column);
+        const double w = ellipse_weight(r2);
+        const std::size_t texel =
+            on_face ? face + (static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                              static_cast<std::size_t>(column)) *
+                                 result.size()
+                    : texel_at(map.layout, level, point.face, row, column);
         weight += w;
-        for (std::size_t c = 0; c < result.size(); ++c) result[c] += w * static_cast<double>(texel[c]);
+        for (std::size_t c = 0; c < result.size(); ++c) {
+          result[c] += w * static_cast<double>(map.values[texel + c]);
+        }
       }
     }
     if (weight > 0.0) {

@@ -21,6 +21,7 @@
 #include "mirrorbake/envmap/compare.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
+#include "mirrorbake/envmap/half_envmap.hpp"
 #include "mirrorbake/envmap/ktx2.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/envmap/resample.hpp"
@@ -80,6 +81,31 @@ TEST(Half, EveryFiniteHalfSurvivesAndNeighboursRoundToEven) {
   EXPECT_EQ(half_from_float(65519.0F), 0x7bffu);
   EXPECT_EQ(half_from_float(65520.0F), 0x7c00u);
   EXPECT_EQ(half_from_float(1e-10F), 0u);
+}
+
+TEST(Half, AMapComesBackRoundedAndWhatIsTooLargeIsClampedAndCounted) {
+  EnvMap map = directions("cube", 8, 8);
+  map.values[0] = 1e30F;
+  map.values[1] = -std::numeric_limits<float>::infinity();
+  map.values[2] = 65519.0F;  // rounds to 65504
+  map.values[3] = std::numeric_limits<float>::quiet_NaN();
+  std::size_t clamped = 0;
+  const HalfEnvMap half = half_from_float(map, &clamped);
+  const EnvMap again = float_from_half(half);
+  EXPECT_EQ(clamped, 2u);
+  EXPECT_EQ(again.layout, map.layout);
+  EXPECT_EQ(again.channels, map.channels);
+  EXPECT_EQ(again.values[0], 65504.0F);
+  EXPECT_EQ(again.values[1], -65504.0F);
+  EXPECT_EQ(again.values[2], 65504.0F);
+  EXPECT_TRUE(std::isnan(again.values[3]));
+  for (std::size_t i = 4; i < map.values.size(); ++i) {
+    EXPECT_EQ(again.values[i], float_from_half(half_from_float(map.values[i])));
+    EXPECT_NEAR(again.values[i], map.values[i], 0x1p-11F * std::abs(map.values[i]));
+  }
+  HalfEnvMap broken = half;
+  broken.values.pop_back();
+  EXPECT_THROW(float_from_half(broken), InvalidArgument);
 }
 
 TEST_F(EnvMapFiles, Ktx2ReturnsEveryLevelRoundedToHalf) {

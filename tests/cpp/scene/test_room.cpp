@@ -17,7 +17,7 @@ const Scene& room() {
   return scene;
 }
 
-const Object& object_named(const Scene& scene, const std::string& name) {
+const Object& object_named(const Scene& scene, std::string_view name) {
   const auto it = std::find_if(scene.objects.begin(), scene.objects.end(),
                                [&](const Object& o) { return o.name == name; });
   EXPECT_NE(it, scene.objects.end()) << name;

@@ -81,6 +81,54 @@ def test_layers_and_samples_recompose_the_beauty(tracer: Tracer) -> None:
     np.testing.assert_allclose(sum_of_layers, trace.sample_beauty, rtol=1e-5, atol=1e-6)
 
 
+def test_several_reflectors_are_traced_in_one_call() -> None:
+    scene, ring = scene_with_ring()
+    ball = scene.add_object("ball", _core.make_sphere((1, 0.5, 0), 0.4, 24), scene.object_material(ring))
+    tracer = Tracer(scene, TracerOptions(indirect=IndirectLight.none))
+    options = TraceOptions(samples_per_pixel=4)
+    together = tracer.trace_layers_of(CAMERA, [ring, ball], options)
+    assert len(together) == 2
+    for reflector, trace in zip((ring, ball), together, strict=True):
+        assert len(trace.samples) > 20
+        np.testing.assert_array_equal(trace.layers, tracer.trace_layers(CAMERA, reflector, options).layers)
+    with pytest.raises(_core.InvalidArgument, match="reflectors"):
+        tracer.trace_layers_of(CAMERA, [ring, ring], options)
+
+
+def test_a_window_is_a_part_of_the_image(tracer: Tracer) -> None:
+    options = TraceOptions(samples_per_pixel=2)
+    assert options.window == [0, 0, 0, 0]
+    whole = tracer.trace_beauty(CAMERA, options)
+    options.window = [5, 3, 7, 9]
+    np.testing.assert_array_equal(tracer.trace_beauty(CAMERA, options), whole[3:12, 5:12])
+    with pytest.raises(_core.InvalidArgument, match="window"):
+        tracer.trace_beauty(CAMERA, TraceOptions(window=[20, 0, 7, 9]))
+
+
+def test_tracing_to_a_noise_says_what_it_reached(tracer: Tracer) -> None:
+    trace = tracer.trace_beauty_to_noise(CAMERA, 0.05, TraceOptions(samples_per_pixel=2048))
+    assert trace.image.shape == (16, 24, 3)
+    assert not trace.image.flags.writeable
+    assert 0 < trace.noise <= 0.05
+    assert 16 <= trace.mean_samples_per_pixel < 2048
+    assert trace.share_above == 0
+    with pytest.raises(_core.InvalidArgument, match="noise"):
+        tracer.trace_beauty_to_noise(CAMERA, 0.0)
+
+
+def test_distances_alone_are_those_of_intersect(tracer: Tracer) -> None:
+    random = np.random.default_rng(1)
+    directions = random.normal(size=(1000, 3)).astype(np.float32)
+    origins = np.broadcast_to(np.array([0.2, 2.0, 1.0], np.float32), directions.shape).copy()
+    distance, hit, _ = tracer.intersect(origins, directions, [0])
+    alone = tracer.intersect_distance(origins, directions, [0])
+    assert 100 < (hit == 1).sum() < 900
+    np.testing.assert_array_equal(alone[0], distance)
+    np.testing.assert_array_equal(alone[1], hit)
+    with pytest.raises(_core.InvalidArgument, match="directions"):
+        tracer.intersect_distance(origins, directions[:-1])
+
+
 def test_samples_are_read_only_views_that_outlive_their_trace(tracer: Tracer) -> None:
     trace = tracer.trace_layers(CAMERA, 0, TraceOptions(samples_per_pixel=2))
     n = len(trace.samples)

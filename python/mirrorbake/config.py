@@ -295,13 +295,23 @@ class SceneConfig(_Section):
 
     reflector: Reflector = Reflector(object="teapot")
     material: MaterialConfig | None = None
-    """Default: a scene object's own material, for other reflectors the section's defaults."""
+    """None: the material that a `scene_object` has in its file."""
     surroundings: Surroundings = Surroundings(room="furnished")
     views: Views = Views()
     layers: Layers = Layers()
     maps: Maps = Maps()
     trace: Trace = Trace()
     infer: Infer = Infer()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _other_reflectors_have_a_material(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or data.get("material") is not None:
+            return data
+        reflector = data.get("reflector")
+        if isinstance(reflector, Mapping) and reflector.get("scene_object") is not None:
+            return data
+        return {**data, "material": {}}
 
     @model_validator(mode="after")
     def _scene_object_has_a_scene(self) -> SceneConfig:

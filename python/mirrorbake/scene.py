@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.config import ILLUMINANT, PATH_KEYS, MaterialConfig
+from mirrorbake.config import ILLUMINANT, PATH_KEYS
 from mirrorbake.errors import InputError
 from mirrorbake.files import sha256_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mirrorbake.config import Reflector, SceneConfig, Surroundings, Views
+    from mirrorbake.config import MaterialConfig, Reflector, SceneConfig, Surroundings, Views
     from mirrorbake.metrics import FloatArray
 
 DEFAULT_ELEVATION_DEGREES = 20.0
@@ -105,13 +105,13 @@ def build_scene(config: SceneConfig) -> BuiltScene:
     scene, notes = _surroundings(config.surroundings)
     if config.reflector.scene_object is None:
         mesh, part_names = _load_reflector(config.reflector)
-        reflector = scene.add_object(
-            REFLECTOR_NAME, mesh, _material(config.material or MaterialConfig(), scene), part_names
-        )
+        assert config.material is not None
+        material = _material(config.material, scene)
+        reflector = scene.add_object(REFLECTOR_NAME, mesh, material, part_names)
     else:
         reflector = _scene_reflector(config, scene)
         mesh, part_names = scene.object_mesh(reflector), scene.object_part_names(reflector)
-    material = scene.material(scene.object_material(reflector))
+    shiny = scene.material(scene.object_material(reflector))
     positions = np.asarray(mesh.positions)
     triangles = np.asarray(mesh.triangles)
     parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
@@ -129,7 +129,7 @@ def build_scene(config: SceneConfig) -> BuiltScene:
         triangles=triangles,
         parts=parts,
         part_names=part_names,
-        has_diffuse=any(material.albedo) or any(material.emission),
+        has_diffuse=any(shiny.albedo) or any(shiny.emission),
         arc=arc,
         notes=notes,
     )

@@ -171,13 +171,16 @@ class Source:
             return f"mirrorbake {other.library} instead of {self.library}"
         mine, others = self._content(), other._content()
         for section, table in mine.items():
-            for key, value in table.items():
-                theirs = others[section][key]
+            present = others[section] or {}
+            for key, value in (table or {}).items():
+                theirs = present.get(key)
                 if theirs != value:
                     name = f"{section}.{key}"
                     if name in self.inputs and name in other.inputs:
                         return f"{name}: a file of other content"
                     return f"{name} = {theirs!r} instead of {value!r}"
+            if table is None and others[section] is not None:
+                return f"a section [{section}] instead of none"
         return "nothing"
 
 

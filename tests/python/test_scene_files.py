@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from mirrorbake.config import parse_config
 from mirrorbake.errors import InputError
 from mirrorbake.evaluate import evaluate
 from mirrorbake.scene import build_scene, hash_inputs
+from mirrorbake.store import Source
 
 from .gltf_scene import SQUARE, SQUARE_NORMALS, SQUARE_TRIANGLES, SQUARE_UVS, GlbScene, png
 
@@ -237,6 +239,24 @@ def test_an_object_of_a_gltf_scene_is_baked_where_it_stands(tmp_path: Path) -> N
     # Facets of an octahedron are flat mirrors: what stands near is far from where an infinite map has it.
     assert pem > 25.0
     assert pem > static + 3.0
+
+
+def test_a_bake_with_another_material_is_another_scene(tmp_path: Path) -> None:
+    surroundings = {"scene": str(tiny_room(tmp_path / "room.glb", shiny=MIRROR))}
+    data: dict[str, Any] = {"reflector": {"scene_object": "gem"}, "surroundings": surroundings}
+
+    def source(**sections: Any) -> Source:
+        config = parse_config({**data, **sections}, "scene")
+        return Source("1", json.loads(config.model_dump_json()), hash_inputs(config))
+
+    files, own = source(), source(material={"r0": 0.5})
+    assert files.fingerprint == source().fingerprint
+    assert files.fingerprint != own.fingerprint
+    assert files.difference_from(files) == "nothing"
+    assert files.difference_from(own) == "a section [material] instead of none"
+    assert own.difference_from(files).startswith("material.")
+    # What a PEM keeps of its scene can be read again.
+    assert parse_config(files.config, "again").material is None
 
 
 def test_a_reflector_of_its_own_stands_in_a_scene_from_a_file(tmp_path: Path) -> None:

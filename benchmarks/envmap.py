@@ -1,12 +1,13 @@
 """Environment maps: conversions, mips and lookups against py360convert, skylibs, SciPy, oiiotool and maketx.
 
-The synthetic panorama has twelve lights of 5e4, 1° to 2° wide, before a background of 0.1 to 1. For conversions
-to fewer texels the error is the relative L2 distance to the mean of the panorama over each texel, by 24² places
-in float64; for smooth ones it is the distance to the analytic background, without lights. A real
-panorama, from MIRRORBAKE_TEST_DATA, is halved before it is made larger, so that the original is the reference.
+The synthetic panorama has twelve lights of 5e4, 1° to 2° wide, before a background of 0.1 to 1. For
+conversions to fewer texels the error is the relative L2 distance to the mean of the panorama over each
+texel, by 24² places in float64; for smooth ones it is the distance to the analytic background, without
+lights. A real panorama, from MIRRORBAKE_TEST_DATA, is halved before it is made larger, so that the original
+is the reference.
 
-py360convert keeps the coordinates of a conversion. "first" is what one conversion costs, with its caches cleared;
-"again" is any further one of the same sizes.
+py360convert keeps the coordinates of a conversion. "first" is what one conversion costs, with its caches
+cleared; "again" is any further one of the same sizes.
 """
 
 import importlib

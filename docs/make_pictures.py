@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mirrorbake.envmap import EnvMap
-from mirrorbake.projection import texel_directions
+from mirrorbake.projection import texel_directions, texel_solid_angles
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -73,9 +73,27 @@ def seam_pictures() -> None:
         )
 
 
+def density_table() -> None:
+    """[EMT] figure 4, measured at 512 texels a side: solid angles of the texels inside of the domain."""
+    lines = [
+        "| projection | smallest texel, 1e-6 sr | largest | largest : smallest |",
+        "| --- | --- | --- | --- |",
+    ]
+    rows, columns = (np.arange(512) - 255.5)[:, None], (np.arange(512) - 255.5)[None, :]
+    inside = np.hypot(np.abs(rows) + 0.5, np.abs(columns) + 0.5) <= 256
+    for projection in ("cube", "dual_paraboloid", "sphere_map", "angular", "latlong"):
+        angles = texel_solid_angles(projection, 512, 512)
+        if projection not in ("cube", "latlong"):
+            angles = angles[inside]
+        low, high = angles.min(), angles.max()
+        lines.append(f"| `{projection}` | {1e6 * low:.3g} | {1e6 * high:.3g} | {high / low:.3g} |")
+    (FOLDER / "densities.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def draw() -> None:
     """Write all pictures."""
     FOLDER.mkdir(parents=True, exist_ok=True)
+    density_table()
     panorama = labelled_panorama(512)
     panorama.resample("latlong", 160).save(FOLDER / "latlong.png")
     for projection in ("sphere_map", "angular", "fisheye"):

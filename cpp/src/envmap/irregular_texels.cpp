@@ -203,11 +203,16 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
     add(texel(center), density * std::abs((high.x - low.x) * (high.y - low.y)));
     return;
   }
-  for (int i = 0; i < 4; ++i) {
-    const glm::dvec2 from(i % 2 ? middle.x : low.x, i / 2 ? middle.y : low.y);
-    const glm::dvec2 to(i % 2 ? high.x : middle.x, i / 2 ? high.y : middle.y);
-    gather(face, from, to, this->corners(face, from, to), depth + 1);
-  }
+  // The corners of the four parts, row by row; the outer ones are known.
+  const Corner center = corner(face, middle.x, middle.y);
+  const Corner top = corner(face, middle.x, low.y);
+  const Corner right = corner(face, high.x, middle.y);
+  const Corner bottom = corner(face, middle.x, high.y);
+  const Corner left = corner(face, low.x, middle.y);
+  gather(face, low, middle, {corners[0], top, center, left}, depth + 1);
+  gather(face, {middle.x, low.y}, {high.x, middle.y}, {top, corners[1], right, center}, depth + 1);
+  gather(face, {low.x, middle.y}, {middle.x, high.y}, {left, center, bottom, corners[3]}, depth + 1);
+  gather(face, middle, high, {center, right, corners[2], bottom}, depth + 1);
 }
 
 void IrregularTexels::gather_quad(int face, const Quad& quad) {

@@ -127,18 +127,15 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
     const double cross = magnitude(px * qy - py * qx);
     const double shift = magnitude(bend_x * py - bend_y * px) + magnitude(bend_x * qy - bend_y * qx);
     const double longest = larger(larger(magnitude(px), magnitude(py)), larger(magnitude(qx), magnitude(qy)));
-    // The image is as long and as wide as the singular values of the map, with half the diagonals as axes. A long one, as
-    // around a pole, is as fine as it is wide.
+    // The image is as long and as wide as the singular values of the map, whose squares add up to `squares`. A long one, as
+    // around a pole, is as fine as it is wide: from 2 : 1 on, where the sum is 2.5 areas, fully at 2.5 : 1.
     const double area = 0.5 * cross;
     const double squares = 0.5 * (px * px + py * py + qx * qx + qy * qy);
-    const double discriminant = squares * squares - 4.0 * area * area;
-    const double length2 = 0.5 * (squares + __builtin_sqrt(larger(discriminant, 0.0)));
-    const double root = __builtin_sqrt(area);
-    const double wide = area / __builtin_sqrt(larger(length2, 1e-30));
-    double long_share = 2.0 * length2 / larger(area, 1e-30) - 4.0;
+    double long_share = 2.5 * squares / larger(area, 1e-30) - 6.25;
     long_share = long_share > 0.0 ? long_share : 0.0;
     long_share = long_share < 1.0 ? long_share : 1.0;
-    const double side = root + long_share * (wide - root);
+    const double wide2 = area * area * squares / larger(squares * squares - area * area, 1e-30);
+    const double side = __builtin_sqrt(area + long_share * (wide2 - area));
     const bool straight =
         (magnitude(bend_x) + magnitude(bend_y) < larger(kStraightBend, per_length * longest)) &
         (shift <= most_shift * cross) & (longest < farthest) & (side > 1e-6);

@@ -1,5 +1,6 @@
 """Environment maps through Python: no copies, shapes, errors, and properties of random maps."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -175,3 +176,17 @@ def test_half_is_what_numpy_rounds_to_but_for_what_it_cannot_hold() -> None:
     np.testing.assert_array_equal(half, np.clip(values, -65504, 65504).astype(np.float16).ravel())
     again = EnvMap.from_array(half.reshape(values.shape), "dual_paraboloid")
     np.testing.assert_array_equal(again.values, half.astype(np.float32))
+
+
+@pytest.mark.skipif("MIRRORBAKE_TEST_DATA" not in os.environ, reason="MIRRORBAKE_TEST_DATA is not set")
+def test_area_keeps_the_flux_of_a_photographed_panorama_between_any_two_projections() -> None:
+    panorama = EnvMap.load(Path(os.environ["MIRRORBAKE_TEST_DATA"]) / "workshop.exr")
+    # About as many texels each.
+    sizes = {"cube": 64, "dual_paraboloid": 111, "sphere_map": 157, "latlong": 111, "angular": 157}
+    for source, source_size in sizes.items():
+        before = panorama.resample(source, source_size, filter="area")
+        for target, target_size in sizes.items():
+            after = before.resample(target, target_size, filter="area")
+            np.testing.assert_allclose(
+                after.flux(), before.flux(), rtol=1e-3, err_msg=f"{source} to {target}"
+            )

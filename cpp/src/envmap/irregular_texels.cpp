@@ -21,8 +21,8 @@ StraightLimits straight_limits(const EnvMapLayout& source) {
   const double length = 0.25 * (source.width + 4);
   constexpr double kAny = std::numeric_limits<double>::max();
   switch (source.projection.kind) {
-    // Around the poles of a panorama images are long and bent along their length: n texels of the target away from one straight
-    // edges shift 1/(12 n) of the area.
+    // Around the poles of a panorama images are long and bent along their length: n texels of the target away
+    // from one straight edges shift 1/(12 n) of the area.
     case ProjectionKind::latlong: return {0.1, kAny, length};
     case ProjectionKind::cube:
     case ProjectionKind::dual_paraboloid: return {0.01, kAny, length};
@@ -98,7 +98,8 @@ void IrregularTexels::add(const float* values, double weight) {
   for (std::size_t c = 0; c < radiance_.size(); ++c) radiance_[c] += weight * static_cast<double>(values[c]);
 }
 
-// The texel as a quadrilateral in the plane of the source face of its first corner; nothing if it is not close to one.
+// The texel as a quadrilateral in the plane of the source face of its first corner; nothing if it is not
+// close to one.
 std::optional<Quad> IrregularTexels::regular_quad(const Corners& corners, int depth) const {
   Quad quad;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -174,7 +175,8 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
   const DiscExtent place =
       clipped_ ? disc_extent(job_.target.projection.kind, low, high) : DiscExtent::inside;
   if (place == DiscExtent::outside) return;
-  // Faces of the source that the corners lie on; a face that only the inside of the texel touches is a sliver.
+  // Faces of the source that the corners lie on; a face that only the inside of the texel touches is a
+  // sliver.
   std::array<int, 4> faces{};
   std::size_t count = 0;
   for (const Corner& corner : corners) {

@@ -47,8 +47,8 @@ using Quad = std::array<glm::dvec2, 4>;
 StraightLimits straight_limits(const EnvMapLayout& source);
 bool is_straight(const Quad& quad, const StraightLimits& limits);
 
-/// How much of `automatic` is interpolation rather than area for texels that many of the source's long. At less than one texel of the
-/// source nothing is left to alias, so that the change is quick.
+/// How much of `automatic` is interpolation rather than area for texels that many of the source's long. At
+/// less than one texel of the source nothing is left to alias, so that the change is quick.
 double interpolated_share(double side);
 
 enum class DiscExtent { inside, crosses_rim, outside };
@@ -56,8 +56,8 @@ enum class DiscExtent { inside, crosses_rim, outside };
 /// Where a rectangle of a round map lies; always inside for the others.
 DiscExtent disc_extent(ProjectionKind kind, glm::dvec2 low, glm::dvec2 high);
 
-/// Texels whose image in the source is not a quadrilateral on one face: around poles and other singularities, across
-/// the edges of faces, on the rim of a round map. It subdivides them until they are.
+/// Texels whose image in the source is not a quadrilateral on one face: around poles and other singularities,
+/// across the edges of faces, on the rim of a round map. It subdivides them until they are.
 class IrregularTexels {
  public:
   explicit IrregularTexels(const ResampleJob& job);

@@ -17,12 +17,12 @@
 #include "mirrorbake/envmap/texel_lookup.hpp"
 #include "resample_kernels.hpp"
 
-// The mean over a texel's image in the source is exact by Green's theorem. With G(x, y) the running sum of value times
-// solid angle from the left end of row y of the source to x, the flux through a texel is ∮ G dy around its image, and
-// ∮ of the running solid angle is its solid angle. An edge belongs to two texels and is walked once; the walk takes as many
-// steps as the edge meets rows and columns of the source. What one texel loses by an edge taken for straight its neighbour gets,
-// so that the flux is kept. The target is worked off in square tiles; of the part of the source that a tile needs, the running sums
-// fit into the cache.
+// The mean over a texel's image in the source is exact by Green's theorem. With G(x, y) the running sum of
+// value times solid angle from the left end of row y of the source to x, the flux through a texel is ∮ G dy
+// around its image, and ∮ of the running solid angle is its solid angle. An edge belongs to two texels and is
+// walked once; the walk takes as many steps as the edge meets rows and columns of the source. What one texel
+// loses by an edge taken for straight its neighbour gets, so that the flux is kept. The target is worked off
+// in square tiles; of the part of the source that a tile needs, the running sums fit into the cache.
 
 namespace mirrorbake {
 
@@ -53,8 +53,8 @@ struct Positions {
   }
 };
 
-/// Directions of points along lines of the target, and where they lie in the source. On cubes, panoramas and paraboloids a
-/// line of constant y is p + u(x) q + v(x) r, with tables of u and v.
+/// Directions of points along lines of the target, and where they lie in the source. On cubes, panoramas and
+/// paraboloids a line of constant y is p + u(x) q + v(x) r, with tables of u and v.
 class LineLookup {
  public:
   /// At the given x of the target.
@@ -301,8 +301,8 @@ class TileResampler {
     }
   }
 
-  // The texels of a row that take area on the present face, with a texel that does not on either side, and a row of such
-  // above and below the tile.
+  // The texels of a row that take area on the present face, with a texel that does not on either side, and a
+  // row of such above and below the tile.
   std::uint8_t* takes(int row) {
     return takes_.data() + static_cast<std::size_t>(row + 1) * (static_cast<std::size_t>(tile_.columns) + 2) +
            1;
@@ -334,8 +334,8 @@ class TileResampler {
     return true;
   }
 
-  /// Running sums of some channels. False if they are not finite: then the texels are left to a method in which what is NaN
-  /// or infinite does not spread along its row.
+  /// Running sums of some channels. False if they are not finite: then the texels are left to a method in
+  /// which what is NaN or infinite does not spread along its row.
   bool fill_window(int face, int first, int channels) {
     const EnvMapLayout& layout = job_.source.layout;
     window_.blocks = channels <= 3 ? 1 : 2;
@@ -502,8 +502,8 @@ void resample_centers(const ResampleJob& job, EnvMap& result) {
   });
 }
 
-// Solid angles of the texels of the source as if the rim did not cut them: it cuts the images of the target's texels.
-// Where texels are many and small, the density in their centre will do.
+// Solid angles of the texels of the source as if the rim did not cut them: it cuts the images of the target's
+// texels. Where texels are many and small, the density in their centre will do.
 void set_weights(ResampleJob& job) {
   const Projection& projection = job.projection();
   const int width = job.width();

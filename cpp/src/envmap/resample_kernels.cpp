@@ -21,9 +21,9 @@ inline int floor_of(double v) {
   return static_cast<double>(i) > v ? i - 1 : i;
 }
 
-// Angle of the point (x, y), like std::atan2, within 1e-13 rad; 0 or ±π at the origin. One division: the octant folds
-// the slope into [0, 1], and (a − b)/(a + b) turns it by another 45° if it is above tan(π/8). The polynomial is the best
-// one for atan(t)/t in t² on [0, tan²(π/8)] (Remez, relative error 2.6e-14).
+// Angle of the point (x, y), like std::atan2, within 1e-13 rad; 0 or ±π at the origin. One division: the
+// octant folds the slope into [0, 1], and (a − b)/(a + b) turns it by another 45° if it is above tan(π/8).
+// The polynomial is the best one for atan(t)/t in t² on [0, tan²(π/8)] (Remez, relative error 2.6e-14).
 inline double angle(double y, double x) {
   const double ax = magnitude(x);
   const double ay = magnitude(y);
@@ -127,8 +127,9 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
     const double cross = magnitude(px * qy - py * qx);
     const double shift = magnitude(bend_x * py - bend_y * px) + magnitude(bend_x * qy - bend_y * qx);
     const double longest = larger(larger(magnitude(px), magnitude(py)), larger(magnitude(qx), magnitude(qy)));
-    // The image is as long and as wide as the singular values of the map, whose squares add up to `squares`. A long one, as
-    // around a pole, is as fine as it is wide: from 2 : 1 on, where the sum is 2.5 areas, fully at 2.5 : 1.
+    // The image is as long and as wide as the singular values of the map, whose squares add up to `squares`.
+    // A long one, as around a pole, is as fine as it is wide: from 2 : 1 on, where the sum is 2.5 areas,
+    // fully at 2.5 : 1.
     const double area = 0.5 * cross;
     const double squares = 0.5 * (px * px + py * py + qx * qx + qy * qy);
     double long_share = 2.5 * squares / larger(area, 1e-30) - 6.25;
@@ -218,7 +219,8 @@ bool is_finite(const double* sums, int count) {
   return finite;
 }
 
-// Three channels of texels of three: the hot case. A texel is read with the next one's first value, but for the last.
+// Three channels of texels of three: the hot case. A texel is read with the next one's first value, but for
+// the last.
 bool running_sums_rgb(const float* __restrict texels, const double* __restrict weights, int weight_step,
                       int width, const FluxWindow& window, double* __restrict result) {
   typedef std::int64_t Mask __attribute__((vector_size(32)));
@@ -269,8 +271,8 @@ bool running_sums(const float* texels, const double* weights, int weight_step, i
   return is_finite(result, sums);
 }
 
-// Of edges within the window, in its coordinates. Along a piece within one texel the running sum is linear in x, so that
-// its value in the middle is the mean.
+// Of edges within the window, in its coordinates. Along a piece within one texel the running sum is linear in
+// x, so that its value in the middle is the mean.
 template <int kBlocks>
 class EdgeWalk {
  public:

@@ -51,8 +51,9 @@ int add(Scene& scene, TriangleMesh mesh) {
   return static_cast<int>(scene.objects.size()) - 1;
 }
 
-// The sky is interpolated from texels of 3°, 3e-4 off; a texel's mean differs from its centre by its curvature, less than
-// 2e-3 but for the stretched ones along the sphere map's rim. Beyond the rim the projections go on.
+// The sky is interpolated from texels of 3°, 3e-4 off; a texel's mean differs from its centre by its
+// curvature, less than 2e-3 but for the stretched ones along the sphere map's rim. Beyond the rim the
+// projections go on.
 TEST(Capture, OfASkyIsTheSkyInEveryProjection) {
   const Tracer tracer(under_a_smooth_sky(), no_indirect_light());
   constexpr int kSize = 48;
@@ -82,8 +83,8 @@ TEST(Capture, OfASkyIsTheSkyInEveryProjection) {
   }
 }
 
-// What share of a texel a lamp covers, found by the projection's own directions, 24² to a texel. 256 stratified samples are
-// off by less than 0.1 at the edge of the lamp.
+// What share of a texel a lamp covers, found by the projection's own directions, 24² to a texel. 256
+// stratified samples are off by less than 0.1 at the edge of the lamp.
 TEST(Capture, RaysGoStraightThroughTheParaboloids) {
   Scene scene;
   RectangleLight lamp;

@@ -112,8 +112,8 @@ class LinearInput : public OIIO::ImageInput {
       if (i % source_channels_ >= channels_) continue;  // alpha is the last channel
       linear.push_back(is_srgb_ ? srgb_decode(source[i]) : source[i]);
     }
-    OIIO::convert_types(OIIO::TypeDesc::FLOAT, linear.data(), m_spec.format, data,
-                        static_cast<int>(linear.size()));
+    OIIO::convert_pixel_values(OIIO::TypeDesc::FLOAT, linear.data(), m_spec.format, data,
+                               static_cast<int>(linear.size()));
   }
 
   std::unique_ptr<OIIO::ImageInput> inner_;
@@ -122,21 +122,22 @@ class LinearInput : public OIIO::ImageInput {
   std::size_t channels_ = 0;
 };
 
-// One for all files, and until the process ends: threads may look up to the last.
+// One for all files, and until the process ends, never destroyed: threads may look up to the last. OpenImageIO 2 makes a
+// pointer of it, 3 a shared one.
 OIIO::TextureSystem& texture_system() {
-  static OIIO::TextureSystem* const system = [] {
-    OIIO::TextureSystem* made = OIIO::TextureSystem::create(false);
-    made->attribute("max_memory_MB", kDefaultCacheMebibytes);
-    made->attribute("max_open_files", 64);
-    made->attribute("autotile", 64);
-    made->attribute("automip", 1);
-    made->attribute("accept_untiled", 1);
-    made->attribute("accept_unmipped", 1);
-    made->attribute("gray_to_rgb", 1);
-    made->attribute("failure_retries", 0);
+  static const auto* const system = [] {
+    auto* const made = new auto(OIIO::TextureSystem::create(false));
+    (*made)->attribute("max_memory_MB", kDefaultCacheMebibytes);
+    (*made)->attribute("max_open_files", 64);
+    (*made)->attribute("autotile", 64);
+    (*made)->attribute("automip", 1);
+    (*made)->attribute("accept_untiled", 1);
+    (*made)->attribute("accept_unmipped", 1);
+    (*made)->attribute("gray_to_rgb", 1);
+    (*made)->attribute("failure_retries", 0);
     return made;
   }();
-  return *system;
+  return **system;
 }
 
 OIIO::TextureOpt::Wrap wrap_mode(TextureWrap wrap) {

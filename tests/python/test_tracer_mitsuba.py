@@ -160,7 +160,9 @@ def gold_ring(directory: Path) -> Twin:
 def under_the_sky(directory: Path) -> Twin:
     twin = Twin(directory, eye=(0.4, 1.5, 4.0), target=(0.0, 0.6, 0.0), fov=40.0)
     twin.matte(core.make_rectangle((-3, 0, 3), (6, 0, 0), (0, 0, -6)), (0.5, 0.5, 0.5))
-    twin.matte(core.make_torus((0, 0.5, 0), 0.6, 0.3, 48), (0.7, 0.4, 0.2))
+    # Flat: where an interpolated normal turns away from the eye, Mitsuba lights the silhouette from behind.
+    ring = core.make_torus((0, 0.5, 0), 0.6, 0.3, 48)
+    twin.matte(core.TriangleMesh(ring.positions, ring.triangles), (0.7, 0.4, 0.2))
     azimuth = (np.arange(64) + 0.5) / 64 * 2 * np.pi
     row = np.stack([2 + np.sin(azimuth), 2 + np.cos(azimuth), 1 + 8 * (np.abs(azimuth - 2) < 0.3)], axis=-1)
     twin.sky(np.ascontiguousarray(np.broadcast_to(row, (32, 64, 3)), dtype=np.float32))

@@ -42,7 +42,7 @@ struct SurfaceSamples {
   std::vector<glm::vec3> diffuse;   ///< D: radiance that the body reflects and emits
   std::vector<glm::vec4> local;     ///< incident radiance from the reflector itself, premultiplied, and α
   std::vector<glm::vec3> distant;   ///< incident radiance through the reflector
-  std::vector<float> hit_distance;  ///< along `reflection` to what the distant ray hits; +inf: nothing
+  std::vector<float> hit_distance;  ///< along its ray to what the distant ray hits; +inf: nothing
 
   std::size_t size() const { return pixel.size(); }
 };

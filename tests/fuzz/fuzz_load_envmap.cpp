@@ -19,7 +19,8 @@ int fuzz_load_envmap(const std::uint8_t* data, std::size_t size) {
   using namespace mirrorbake;  // NOLINT(google-build-using-namespace): one function
   if (size == 0) return 0;
   const char* extensions[] = {".exr", ".hdr", ".tif", ".png", ".jpg", ".ktx2", ".ktx2", ".ktx2"};
-  const FaceLayout layouts[] = {FaceLayout::automatic, FaceLayout::strip, FaceLayout::cross, FaceLayout::grid};
+  const FaceLayout layouts[] = {FaceLayout::automatic, FaceLayout::strip, FaceLayout::cross,
+                                FaceLayout::grid};
   const std::string path = (std::filesystem::temp_directory_path() /
                             ("mirrorbake-fuzz-" + std::to_string(getpid()) + extensions[data[0] % 8]))
                                .string();

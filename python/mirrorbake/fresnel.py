@@ -50,14 +50,20 @@ def _result_type(*values: ArrayLike) -> type[np.float32] | type[np.float64]:
 
 def _apply(function: Any, out: Array | None, c: ArrayLike, *parameters: ArrayLike) -> Array:
     """Call a function of flat arrays: one number per parameter where all are scalars, arrays otherwise."""
-    dtype = _result_type(c, *parameters)
-    arrays = [np.asarray(c, dtype)]
-    numbers = []
-    if all(np.ndim(parameter) == 0 for parameter in parameters):
-        numbers = [float(np.asarray(parameter)) for parameter in parameters]
+    arrays: list[Any]
+    numbers: list[float] = []
+    if isinstance(c, np.ndarray) and c.dtype.char in "fd" and all(isinstance(p, float) for p in parameters):
+        # The usual case, without the microseconds that the general one takes.
+        dtype: Any = c.dtype
+        arrays, numbers = [c], list(parameters)  # type: ignore[arg-type]
     else:
-        arrays += [np.asarray(parameter, dtype) for parameter in parameters]
-        arrays = list(np.broadcast_arrays(*arrays))
+        dtype = _result_type(c, *parameters)
+        arrays = [np.asarray(c, dtype)]
+        if all(np.ndim(parameter) == 0 for parameter in parameters):
+            numbers = [float(np.asarray(parameter)) for parameter in parameters]
+        else:
+            arrays += [np.asarray(parameter, dtype) for parameter in parameters]
+            arrays = list(np.broadcast_arrays(*arrays))
     shape = arrays[0].shape
     if out is None:
         out = np.empty(shape, dtype)

@@ -1,8 +1,7 @@
 """First hits of rays against embreex, the Python binding of Embree 4, on the same triangles.
 
 Both are given arrays and return arrays. mirrorbake also returns object and normal, and checks every ray.
-Where the program bench_rays is built (cmake --preset release; cmake --build --preset release --target
-bench_rays) it adds a comparison with a bare loop over Embree in C++.
+Before that the program bench_rays, which is built first, compares with a bare loop over Embree in C++.
 """
 
 import json
@@ -22,14 +21,16 @@ from mirrorbake import _core as core
 RAYS = 1_000_000
 
 
+def built_bench_rays() -> Path:
+    root = Path(__file__).parents[1]
+    print("==> building bench_rays (some minutes the first time)", file=sys.stderr)
+    for command in (["--preset", "release"], ["--build", "--preset", "release", "--target", "bench_rays"]):
+        subprocess.run(["cmake", *command], cwd=root, stdout=subprocess.DEVNULL, check=True)
+    return root / "build/release/cpp/bench/bench_rays"
+
+
 def bare_embree() -> Iterator[Case]:
-    found = sorted(
-        Path(__file__).parents[1].glob("build/*/cpp/bench/bench_rays"), key=lambda path: path.stat().st_mtime
-    )
-    if not found:
-        print("bench: bench_rays is not built; no comparison with bare Embree", file=sys.stderr)
-        return
-    done = subprocess.run([found[-1]], stdout=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run([built_bench_rays()], stdout=subprocess.PIPE, text=True, check=False)
     require(done.returncode == 0, "bench_rays says so")
     for line in done.stdout.splitlines():
         row = json.loads(line)

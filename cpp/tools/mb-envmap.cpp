@@ -6,8 +6,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -25,40 +23,12 @@
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/envmap/sampling.hpp"
+#include "tool.hpp"
 
 namespace {
 
-using namespace mirrorbake;  // NOLINT(google-build-using-namespace): one program, one namespace
-
-std::string json_string(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) {
-      char code[8];
-      std::snprintf(code, sizeof code, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
-      result += code;
-    } else {
-      result += c;
-    }
-  }
-  return result + "\"";
-}
-
-// Shortest text that reads back as the same number; JSON has no infinity.
-template <typename T>
-std::string json_number(T value) {
-  if (!std::isfinite(static_cast<double>(value))) return "null";
-  char digits[64];
-  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
-}
-
-template <typename T>
-std::string json_list(const std::vector<T>& values) {
-  std::string result = "[";
-  for (std::size_t i = 0; i < values.size(); ++i) result += (i ? ", " : "") + json_number(values[i]);
-  return result + "]";
-}
+using namespace mirrorbake;        // NOLINT(google-build-using-namespace): one program, one namespace
+using namespace mirrorbake::tool;  // NOLINT(google-build-using-namespace)
 
 // What every command that reads a map takes.
 struct Input {
@@ -388,13 +358,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (const NumericalError& error) {
-    std::cerr << "mb-envmap: " << error.what() << '\n';
-    return 4;
-  } catch (const std::exception& error) {
-    std::cerr << "mb-envmap: " << error.what() << '\n';
-    return 3;
-  }
+  return mirrorbake::tool::exit_status("mb-envmap", [&] { return run(argc, argv); });
 }

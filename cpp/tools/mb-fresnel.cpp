@@ -17,6 +17,7 @@
 #include "mirrorbake/shading/fresnel.hpp"
 #include "mirrorbake/shading/fresnel_table.hpp"
 #include "mirrorbake/shading/metals.hpp"
+#include "tool.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -281,13 +282,5 @@ int run(int argc, char** argv) {
 }  // namespace mirrorbake
 
 int main(int argc, char** argv) {
-  try {
-    return mirrorbake::run(argc, argv);
-  } catch (const mirrorbake::NumericalError& error) {
-    std::fprintf(stderr, "mb-fresnel: %s\n", error.what());
-    return 4;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "mb-fresnel: %s\n", error.what());
-    return 3;
-  }
+  return mirrorbake::tool::exit_status("mb-fresnel", [&] { return mirrorbake::run(argc, argv); });
 }

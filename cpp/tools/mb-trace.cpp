@@ -10,7 +10,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <iostream>
 #include <limits>
 #include <numbers>
@@ -30,25 +29,12 @@
 #include "mirrorbake/scene/shapes.hpp"
 #include "mirrorbake/shading/metals.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
+#include "tool.hpp"
 
 namespace {
 
-using namespace mirrorbake;  // NOLINT(google-build-using-namespace): one program, one namespace
-
-std::string json_string(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) {
-      char code[8];
-      std::snprintf(code, sizeof code, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
-      result += code;
-    } else {
-      result += c;
-    }
-  }
-  return result + "\"";
-}
+using namespace mirrorbake;        // NOLINT(google-build-using-namespace): one program, one namespace
+using namespace mirrorbake::tool;  // NOLINT(google-build-using-namespace)
 
 // Whole numbers in `text`, separated by any of `separators`; nothing if it is anything else.
 std::optional<std::vector<int>> parse_numbers(const std::string& text, std::string_view separators) {
@@ -553,13 +539,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (const NumericalError& error) {
-    std::cerr << "mb-trace: " << error.what() << '\n';
-    return 4;
-  } catch (const std::exception& error) {
-    std::cerr << "mb-trace: " << error.what() << '\n';
-    return 3;
-  }
+  return mirrorbake::tool::exit_status("mb-trace", [&] { return run(argc, argv); });
 }

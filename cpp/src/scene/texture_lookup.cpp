@@ -61,7 +61,8 @@ glm::vec3 texture_mean(const Texture& texture) {
   for (std::size_t i = 0; i < image.pixels.size(); i += channels) {
     for (std::size_t c = 0; c < 3; ++c) sum[static_cast<int>(c)] += image.pixels[i + (channels == 1 ? 0 : c)];
   }
-  return glm::vec3(sum / static_cast<double>(image.pixels.size() / channels));
+  const std::size_t texels = image.pixels.size() / channels;
+  return glm::vec3(sum / static_cast<double>(texels));
 }
 
 glm::vec3 texture_lookup(const Scene& scene, const TextureReference& reference, glm::vec2 uv) {

@@ -43,6 +43,9 @@ Array: TypeAlias = npt.NDArray[np.floating[Any]]
 ArrayLike: TypeAlias = npt.ArrayLike
 
 
+_NATIVE = (np.dtype(np.float32), np.dtype(np.float64))
+
+
 def _result_type(*values: ArrayLike) -> type[np.float32] | type[np.float64]:
     arrays = [np.asarray(value).dtype for value in values if not isinstance(value, (int, float))]
     return np.float32 if arrays and all(dtype == np.float32 for dtype in arrays) else np.float64
@@ -52,7 +55,7 @@ def _apply(function: Any, out: Array | None, c: ArrayLike, *parameters: ArrayLik
     """Call a function of flat arrays: one number per parameter where all are scalars, arrays otherwise."""
     arrays: list[Any]
     numbers: list[float] = []
-    if isinstance(c, np.ndarray) and c.dtype.char in "fd" and all(isinstance(p, float) for p in parameters):
+    if type(c) is np.ndarray and c.dtype in _NATIVE and all(isinstance(p, float) for p in parameters):
         # The usual case, without the microseconds that the general one takes.
         dtype: Any = c.dtype
         arrays, numbers = [c], list(parameters)  # type: ignore[arg-type]

@@ -147,6 +147,8 @@ def test_results_broadcast_and_keep_float32() -> None:
     assert fresnel.schlick(c, np.full((2, 5), 0.04, np.float32)).shape == (2, 5)
     assert fresnel.dielectric(np.zeros((0, 3)), 1.5).shape == (0, 3)
     np.testing.assert_array_equal(fresnel.dielectric([-1.0, 2.0, np.nan], 1.5), [1.0, 0.04, np.nan])
+    swapped = c.astype(c.dtype.newbyteorder())
+    np.testing.assert_allclose(fresnel.dielectric(swapped, 1.5), fresnel.dielectric(c, 1.5), rtol=5e-7)
 
 
 def test_results_go_where_they_are_wanted() -> None:

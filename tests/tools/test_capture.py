@@ -1,34 +1,21 @@
 """mb-trace capture from the outside: environment maps of a scene."""
 
 import json
-import os
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mirrorbake.envmap import EnvMap
+from programs import needs_program, run_program
 
-ROOT = Path(__file__).parents[2]
-NAME = "mb-trace"
-BUILDS = [os.environ.get("MIRRORBAKE_TOOLS", ""), *(ROOT / "build").glob("*/cpp/tools")]
-FOUND = [Path(folder) / NAME for folder in map(str, BUILDS) if folder and (Path(folder) / NAME).is_file()]
-
-pytestmark = pytest.mark.skipif(
-    not FOUND, reason=f"{NAME} is not built: cmake --build --preset dev --target {NAME}"
-)
+pytestmark = needs_program("mb-trace")
 
 TRIANGLE = "v -1 -1 -2\nv 1 -1 -2\nv 0 1 -2\nf 1 2 3\n"
 
 
 def capture(*arguments: object, status: int = 0) -> str:
-    newest = max(FOUND, key=lambda path: path.stat().st_mtime)
-    done = subprocess.run(
-        [newest, "capture", *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == status, done.stderr
-    return done.stdout if status == 0 else done.stderr
+    return run_program("mb-trace", "capture", *arguments, status=status)
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 
 from mirrorbake import _core, fresnel
+from programs import find_program
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,13 +26,10 @@ def study(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def tool() -> str:
-    """The program of the newest build tree, or of MIRRORBAKE_TOOLS."""
-    folders = [Path(folder) for folder in [os.environ.get("MIRRORBAKE_TOOLS")] if folder]
-    folders += sorted((ROOT / "build").glob("*/cpp/tools"), key=lambda path: -path.stat().st_mtime)
-    for folder in folders:
-        if found := shutil.which("mb-fresnel", path=str(folder)):
-            return found
-    pytest.skip("mb-fresnel is not built")
+    program = find_program("mb-fresnel")
+    if program is None:
+        pytest.skip("mb-fresnel is not built")
+    return str(program)
 
 
 def test_study_keeps_its_promises_and_draws_them(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import base64
 import json
-import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -11,28 +10,13 @@ import numpy as np
 import pytest
 
 from mirrorbake.envmap import EnvMap
+from programs import find_program, needs_program, run_program
 
-ROOT = Path(__file__).parents[2]
-NAME = "mb-envmap"
-BUILDS = [os.environ.get("MIRRORBAKE_TOOLS", ""), *(ROOT / "build").glob("*/cpp/tools")]
-FOUND = [Path(folder) / NAME for folder in map(str, BUILDS) if folder and (Path(folder) / NAME).is_file()]
-
-pytestmark = pytest.mark.skipif(
-    not FOUND, reason=f"{NAME} is not built: cmake --build --preset dev --target {NAME}"
-)
+pytestmark = needs_program("mb-envmap")
 
 
 def mb_envmap(*arguments: object, status: int = 0) -> str:
-    newest = max(FOUND, key=lambda path: path.stat().st_mtime)
-    done = subprocess.run(
-        [newest, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == status, done.stderr
-    if status != 0:
-        assert done.stdout == ""
-        assert done.stderr.strip()
-        return done.stderr
-    return done.stdout
+    return run_program("mb-envmap", *arguments, status=status)
 
 
 @pytest.fixture
@@ -159,8 +143,9 @@ def test_random_bytes_never_crash_it(panorama: Path, tmp_path: Path) -> None:
                 data[position] = rng.integers(256)
         path = tmp_path / "broken.exr"
         path.write_bytes(data)
-        newest = max(FOUND, key=lambda p: p.stat().st_mtime)
-        done = subprocess.run([newest, "info", path], capture_output=True, timeout=60, check=False)
+        program = find_program("mb-envmap")
+        assert program is not None
+        done = subprocess.run([program, "info", path], capture_output=True, timeout=60, check=False)
         assert done.returncode in (0, 3), done.stderr
 
 

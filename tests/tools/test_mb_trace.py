@@ -1,8 +1,6 @@
 """mb-trace from the outside: what it writes, what it prints, how it fails."""
 
 import json
-import os
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +8,9 @@ import numpy as np
 import pytest
 
 from mirrorbake import _core
+from programs import needs_program, run_program
 
-ROOT = Path(__file__).parents[2]
-NAME = "mb-trace"
-BUILDS = [os.environ.get("MIRRORBAKE_TOOLS", ""), *(ROOT / "build").glob("*/cpp/tools")]
-FOUND = [Path(folder) / NAME for folder in map(str, BUILDS) if folder and (Path(folder) / NAME).is_file()]
-
-pytestmark = pytest.mark.skipif(
-    not FOUND, reason=f"{NAME} is not built: cmake --build --preset dev --target {NAME}"
-)
+pytestmark = needs_program("mb-trace")
 
 # A mirror that stands upright on a white floor, under a sky.
 OBJ = """mtllib scene.mtl
@@ -48,16 +40,7 @@ illum 3
 
 
 def mb_trace(*arguments: object, status: int = 0) -> str:
-    newest = max(FOUND, key=lambda path: path.stat().st_mtime)
-    done = subprocess.run(
-        [newest, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False
-    )
-    assert done.returncode == status, done.stderr
-    if status != 0:
-        assert done.stdout == ""
-        assert done.stderr.strip()
-        return done.stderr
-    return done.stdout
+    return run_program("mb-trace", *arguments, status=status)
 
 
 def read(path: Path) -> tuple[Any, list[str]]:

@@ -37,8 +37,7 @@ inline Crossing crossing(double p, double d, double extent) {
   return {speed > 0 ? distance : 1, speed};
 }
 
-/// The earlier one. Products of fractions neither overflow nor vanish: float32 coordinates span 1e±45, and so
-/// do the float64 ones that a proxy accepts.
+/// The earlier one. The products neither overflow nor vanish within the lengths that proxy.hpp allows.
 inline Crossing first(const Crossing& a, const Crossing& b) {
   const bool a_first = a.distance * b.speed < b.distance * a.speed;
   return {a_first ? a.distance : b.distance, a_first ? a.speed : b.speed};

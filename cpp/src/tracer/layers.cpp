@@ -317,9 +317,10 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
   parallel_for(static_cast<std::size_t>(window.height), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
       auto primary = primary_row(world, camera, rays, window, options, y);
+      std::vector<PixelLayers> means;
       for (int x = 0; x < window.width; ++x) {
         glm::dvec3 beauty(0.0);
-        std::vector<PixelLayers> means(traces.size());
+        means.assign(traces.size(), {});
         for (int i = 0; i < options.samples_per_pixel; ++i) {
           const PrimarySample& sample = primary.next();
           const glm::vec3 value =

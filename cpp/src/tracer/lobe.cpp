@@ -6,6 +6,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "sample_stream.hpp"
+
 namespace mirrorbake {
 namespace {
 
@@ -70,9 +72,7 @@ glm::vec3 sample_lobe(const LobeShape& shape, glm::vec3 view, glm::vec2 u) {
     const auto cosine = static_cast<float>(std::exp(log_cosine));
     const auto sine = static_cast<float>(std::sqrt(-std::expm1(2.0 * log_cosine)));
     const float phi = 2.0F * kPi * u.y;
-    const glm::vec3 axis = std::abs(r.z) < 0.9F ? glm::vec3(0.0F, 0.0F, 1.0F) : glm::vec3(1.0F, 0.0F, 0.0F);
-    const glm::vec3 t = glm::normalize(glm::cross(axis, r));
-    return glm::normalize(sine * (std::cos(phi) * t + std::sin(phi) * glm::cross(r, t)) + cosine * r);
+    return glm::normalize(tracing::Frame(r).to_world({sine * std::cos(phi), sine * std::sin(phi), cosine}));
   }
   // Heitz 2018, appendix A: stretch the view, sample the projected half disk, unstretch.
   const float alpha = shape.roughness;

@@ -187,6 +187,10 @@ TEST(Lookup, DoesNotDependOnTheLengthOfTheDirection) {
     for (float length : {0x1p-100F, 0x1p-20F, 0x1p20F, 0x1p100F}) {
       EXPECT_LT(angle(Long3(lookup_direction(c.proxy, p, length * d)), expected), 2e-7L);
     }
+    for (double length : {1e-100, 1e100}) {
+      const glm::dvec3 wide = length * glm::dvec3(d);
+      EXPECT_LT(angle(Long3(lookup_direction(c.proxy, glm::dvec3(p), wide)), expected), 2e-7L);
+    }
   }
 }
 

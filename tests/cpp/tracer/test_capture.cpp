@@ -12,6 +12,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/scene/shapes.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
+#include "scenes.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -39,16 +40,6 @@ Scene under_a_smooth_sky() {
   }
   scene.environment = sky;
   return scene;
-}
-
-int add(Scene& scene, TriangleMesh mesh) {
-  scene.materials.emplace_back();
-  Object object;
-  object.name = "object " + std::to_string(scene.objects.size());
-  object.mesh = std::move(mesh);
-  object.material = static_cast<int>(scene.materials.size()) - 1;
-  scene.objects.push_back(std::move(object));
-  return static_cast<int>(scene.objects.size()) - 1;
 }
 
 // The sky is interpolated from texels of 3°, 3e-4 off; a texel's mean differs from its centre by its
@@ -129,8 +120,8 @@ TEST(Capture, RaysGoStraightThroughTheParaboloids) {
 TEST(Capture, HiddenObjectsAreAbsentInEveryProjection) {
   Scene scene = under_a_smooth_sky();
   const Tracer empty(scene, no_indirect_light());
-  const int right = add(scene, make_sphere(glm::vec3(2.0F, 0.0F, -1.0F), 0.5F));
-  const int left = add(scene, make_sphere(glm::vec3(-3.0F, 0.0F, -1.0F), 1.0F));
+  const int right = test::add_object(scene, make_sphere(glm::vec3(2.0F, 0.0F, -1.0F), 0.5F), Material{});
+  const int left = test::add_object(scene, make_sphere(glm::vec3(-3.0F, 0.0F, -1.0F), 1.0F), Material{});
   const Tracer tracer(scene, no_indirect_light());
   TraceOptions options;
   options.samples_per_pixel = 4;

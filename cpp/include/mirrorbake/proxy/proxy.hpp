@@ -66,7 +66,8 @@ struct Proxy {
 /// `position`.
 glm::vec3 lookup_direction(const Proxy& proxy, glm::vec3 position, glm::vec3 direction);
 
-/// The same with float64 coordinates.
+/// The same with float64 coordinates; the direction's length is 0 or from 1e-100 to 1e100, whose square and products
+/// are still numbers.
 glm::dvec3 lookup_direction(const Proxy& proxy, glm::dvec3 position, glm::dvec3 direction);
 
 /// The same for many rays, in parallel and vectorised, with the same bits as one at a time. `lookups` may be the same

@@ -287,7 +287,7 @@ class Stopwatch {
 
 struct Beauty {
   Request request;
-  float noise = 0.0F;
+  std::optional<float> noise;
   bool aovs = false;
 
   void run(bool json) const {
@@ -297,8 +297,8 @@ struct Beauty {
     const Tracer tracer = request.tracer(std::move(source));
     const TraceOptions options = request.trace_options();
     BeautyTrace trace;
-    if (noise > 0.0F) {
-      trace = tracer.trace_beauty_to_noise(camera, noise, options);
+    if (noise) {
+      trace = tracer.trace_beauty_to_noise(camera, *noise, options);
     } else {
       trace.image = tracer.trace_beauty(camera, options);
       trace.mean_samples_per_pixel = options.samples_per_pixel;
@@ -309,12 +309,12 @@ struct Beauty {
     } else {
       request.save(trace.image);
     }
-    if (noise > 0.0F && trace.share_above > 0.0) {
+    if (noise && trace.share_above > 0.0) {
       std::cerr << "mb-trace: warning: " << 100.0 * trace.share_above << " % of the tiles need more than "
-                << options.samples_per_pixel << " samples per pixel for a noise of " << noise << '\n';
+                << options.samples_per_pixel << " samples per pixel for a noise of " << *noise << '\n';
     }
     if (!json) {
-      if (noise > 0.0F) {
+      if (noise) {
         std::cerr << "mb-trace: noise " << trace.noise << " after " << trace.mean_samples_per_pixel
                   << " samples per pixel\n";
       }
@@ -323,7 +323,7 @@ struct Beauty {
     std::cout << "{\"output\": " << json_string(request.output) << ", \"width\": " << trace.image.width
               << ", \"height\": " << trace.image.height
               << ", \"samples_per_pixel\": " << trace.mean_samples_per_pixel << ", \"noise\": ";
-    if (noise > 0.0F) {
+    if (noise) {
       std::cout << trace.noise << ", \"tiles_above_noise\": " << trace.share_above;
     } else {
       std::cout << "null";

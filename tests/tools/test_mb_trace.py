@@ -143,6 +143,8 @@ def test_the_built_in_room_has_reflectors_to_choose_from(tmp_path: Path) -> None
         (["beauty", "SCENE", "-o", "OUT", "--crop", "600x4+0+0"], 3, "window"),
         (["beauty", "SCENE", "-o", "OUT", "--spp", "0"], 3, "samples_per_pixel"),
         (["beauty", "SCENE", "-o", "OUT", "--noise", "2"], 3, "noise"),
+        (["beauty", "SCENE", "-o", "OUT", "--noise", "0"], 3, "noise"),
+        (["beauty", "SCENE", "-o", "OUT", "--noise", "nan"], 3, "noise"),
         (["beauty", "SCENE", "-o", "OUT", "--camera", "side"], 3, "--camera"),
         (["layers", "SCENE", "-o", "OUT", "--reflector", "lake"], 3, "mirror"),
         (["layers", "SCENE", "-o", "OUT", "--reflector", "floor"], 3, "specular"),

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "fresnel_kernels.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 
@@ -13,6 +14,10 @@ namespace mirrorbake {
 
 // Elements per task: twenty microseconds of work and more, against about one to hand it out.
 constexpr std::size_t kFresnelGrain = std::size_t{1} << 16;
+
+// From here on the output is written past the caches: a store to memory that is in none of them reads it first. The
+// price is that whoever reads the result at once finds it in memory (docs/adr/0020 has the figures).
+constexpr std::size_t kLargeBytes = std::size_t{1} << 22;
 
 template <typename T>
 void check_input(std::string_view name, std::span<const T> input, std::span<T> f) {
@@ -28,12 +33,13 @@ void check_input(std::string_view name, std::span<const T> input, std::span<T> f
   }
 }
 
-/// Runs `kernel(c, parameters…, f, count)` over chunks; every parameter is one value for the whole array.
+/// Runs `kernel(batch, parameters…)` over chunks; every parameter is one value for the whole array.
 template <typename T, typename Kernel, typename... Parameters>
 void map_cosines(std::span<const T> c, std::span<T> f, Kernel kernel, Parameters... parameters) {
   check_input("c", c, f);
   parallel_for(c.size(), kFresnelGrain, [&](std::size_t begin, std::size_t end) {
-    kernel(c.data() + begin, parameters..., f.data() + begin, end - begin);
+    kernel(FresnelBatch<T>{c.data() + begin, f.data() + begin, end - begin, f.size_bytes() >= kLargeBytes},
+           parameters...);
   });
 }
 
@@ -42,7 +48,8 @@ template <typename T, typename Kernel, typename... Parameters>
 void map_cosines_each(std::span<const T> c, std::span<T> f, Kernel kernel, Parameters... parameters) {
   check_input("c", c, f);
   parallel_for(c.size(), kFresnelGrain, [&](std::size_t begin, std::size_t end) {
-    kernel(c.data() + begin, (parameters.data() + begin)..., f.data() + begin, end - begin);
+    kernel(FresnelBatch<T>{c.data() + begin, f.data() + begin, end - begin, f.size_bytes() >= kLargeBytes},
+           (parameters.data() + begin)...);
   });
 }
 

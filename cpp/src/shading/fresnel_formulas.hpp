@@ -14,10 +14,20 @@
 namespace mirrorbake::MIRRORBAKE_ISA {
 namespace {
 
-template <typename T>
-inline T clamp_cosine(T c) {
-  c = T(0) > c ? T(0) : c;
-  return T(1) < c ? T(1) : c;
+// The bits of floating-point numbers ≥ 0 are in the order of the numbers, and integers have a minimum and a maximum.
+// In comparisons of floats GCC follows c = 0 and c = 1 as separate paths through the whole formula.
+template <typename T, typename Bits>
+inline T clamp_cosine_bits(T c, Bits one, Bits infinity, Bits all_but_sign) {
+  const Bits bits = __builtin_bit_cast(Bits, c);
+  const Bits from_zero = bits > 0 ? bits : 0;
+  const Bits clamped = from_zero < one ? from_zero : one;
+  return __builtin_bit_cast(T, (bits & all_but_sign) > infinity ? bits : clamped);  // NaN stays
+}
+inline float clamp_cosine(float c) {
+  return clamp_cosine_bits<float, int>(c, 0x3F800000, 0x7F800000, 0x7FFFFFFF);
+}
+inline double clamp_cosine(double c) {
+  return clamp_cosine_bits<double, long long>(c, 0x3FF0000000000000, 0x7FF0000000000000, 0x7FFFFFFFFFFFFFFF);
 }
 
 template <typename T>

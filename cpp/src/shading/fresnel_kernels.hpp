@@ -21,27 +21,35 @@ struct ConductorSeries {
   float m[6];
 };
 
+/// f[i] = F(c[i]) for `count` cosines.
+template <typename T>
+struct FresnelBatch {
+  const T* c = nullptr;
+  T* f = nullptr;
+  std::size_t count = 0;
+  bool is_part_of_large = false;  ///< of an array that no second-level cache holds: written past the caches
+};
+
 struct FresnelKernels {
-  void (*schlick_f32)(const float* c, float r0, float* f, std::size_t count);
-  void (*schlick_f64)(const double* c, double r0, double* f, std::size_t count);
-  void (*dielectric_f32)(const float* c, float n2_less_1, float* f, std::size_t count);
-  void (*dielectric_f32_in_double)(const float* c, MediumConstants medium, float* f, std::size_t count);
-  void (*dielectric_f64)(const double* c, MediumConstants medium, double* f, std::size_t count);
-  void (*conductor_f32)(const float* c, float a, float nk, float* f, std::size_t count);
-  void (*conductor_series_f32)(const float* c, const ConductorSeries& series, float* f, std::size_t count);
-  void (*conductor_f32_in_double)(const float* c, MediumConstants medium, float* f, std::size_t count);
-  void (*conductor_f64)(const double* c, MediumConstants medium, double* f, std::size_t count);
-  void (*table_f32)(const float* c, const float* values, std::size_t size, float* f, std::size_t count);
-  void (*table_f64)(const double* c, const float* values, std::size_t size, double* f, std::size_t count);
+  void (*schlick_f32)(const FresnelBatch<float>& batch, float r0);
+  void (*schlick_f64)(const FresnelBatch<double>& batch, double r0);
+  void (*dielectric_f32)(const FresnelBatch<float>& batch, float n2_less_1);
+  void (*dielectric_f32_in_double)(const FresnelBatch<float>& batch, MediumConstants medium);
+  void (*dielectric_f64)(const FresnelBatch<double>& batch, MediumConstants medium);
+  void (*conductor_f32)(const FresnelBatch<float>& batch, float a, float nk);
+  void (*conductor_series_f32)(const FresnelBatch<float>& batch, const ConductorSeries& series);
+  void (*conductor_f32_in_double)(const FresnelBatch<float>& batch, MediumConstants medium);
+  void (*conductor_f64)(const FresnelBatch<double>& batch, MediumConstants medium);
+  void (*table_f32)(const FresnelBatch<float>& batch, const float* values, std::size_t size);
+  void (*table_f64)(const FresnelBatch<double>& batch, const float* values, std::size_t size);
 
   // One set of parameters per element.
-  void (*schlick_each_f32)(const float* c, const float* r0, float* f, std::size_t count);
-  void (*schlick_each_f64)(const double* c, const double* r0, double* f, std::size_t count);
-  void (*dielectric_each_f32)(const float* c, const float* ior, float* f, std::size_t count);
-  void (*dielectric_each_f64)(const double* c, const double* ior, double* f, std::size_t count);
-  void (*conductor_each_f32)(const float* c, const float* eta, const float* k, float* f, std::size_t count);
-  void (*conductor_each_f64)(const double* c, const double* eta, const double* k, double* f,
-                             std::size_t count);
+  void (*schlick_each_f32)(const FresnelBatch<float>& batch, const float* r0);
+  void (*schlick_each_f64)(const FresnelBatch<double>& batch, const double* r0);
+  void (*dielectric_each_f32)(const FresnelBatch<float>& batch, const float* ior);
+  void (*dielectric_each_f64)(const FresnelBatch<double>& batch, const double* ior);
+  void (*conductor_each_f32)(const FresnelBatch<float>& batch, const float* eta, const float* k);
+  void (*conductor_each_f64)(const FresnelBatch<double>& batch, const double* eta, const double* k);
 };
 
 /// The loops for active_isa().

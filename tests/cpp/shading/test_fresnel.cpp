@@ -228,6 +228,32 @@ TEST(Fresnel, AnyNumberOfThreadsAndAnyAlignmentGiveTheSameBits) {
   }
 }
 
+// Large arrays are written past the caches in whole aligned vectors, and from their ends where the output lies a
+// little more than whole pages behind the input.
+TEST(Fresnel, SizeAndPlaceOfArraysDoNotChangeTheBits) {
+  const std::vector<float> some = cosines();
+  for (const std::size_t count : {std::size_t{1000}, (std::size_t{1} << 20) + 1003}) {
+    constexpr std::size_t kPage = 4096 / sizeof(float);
+    const std::size_t pages = count / kPage + 2;
+    std::vector<float> memory(2 * pages * kPage);
+    const std::span<float> c = std::span(memory).first(count);
+    for (std::size_t i = 0; i < count; ++i) c[i] = some[i % some.size()];
+    std::vector<float> expected(some.size());
+    fresnel_schlick(some, 0.04F, expected);
+    for (const std::size_t shift : {0, 1, 7, 16, 500, 513, 1023}) {
+      const std::span<float> f = std::span(memory).subspan(pages * kPage + shift - kPage, count);
+      std::fill(f.begin(), f.end(), -1.0F);
+      fresnel_schlick(c, 0.04F, f);
+      std::size_t wrong = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        wrong +=
+            std::bit_cast<std::uint32_t>(f[i]) != std::bit_cast<std::uint32_t>(expected[i % some.size()]);
+      }
+      EXPECT_EQ(wrong, 0U) << count << " values, shifted by " << shift;
+    }
+  }
+}
+
 TEST(Fresnel, ArraysHaveTheBitsOfSingleValues) {
   const std::vector<float> c = cosines();
   std::vector<float> f(c.size());

@@ -1,160 +1,377 @@
-"""What a scene requires, found before it is baked: layers, bounces, resolution of the maps (spec T6)."""
+"""Decides what a bake does by a few small images: "model only what a scene requires" (spec T6)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.scene import prepare_stage
+from mirrorbake.errors import InputError
+from mirrorbake.plan import Decision, Plan
+from mirrorbake.proxy import choose_proxy, hull_triangles
+from mirrorbake.run_time import proxy_to_attributes
 
 if TYPE_CHECKING:
-    from mirrorbake.config import SceneConfig
-    from mirrorbake.scene import Arc, Stage
+    from collections.abc import Sequence
 
-PROBE_VIEWS = 3
-PROBE_SIDE = 96
-"""Longer side of the images with which bounces are counted, in pixels."""
+    from numpy.typing import NDArray
+
+    from mirrorbake.metrics import FloatArray
+    from mirrorbake.scene import Stage
+
+    DoubleArray = NDArray[np.float64]
+
+PROBE_VIEWS = 5
+PROBE_SIDE = 128
+"""Longer side of the trial images, in pixels."""
 PROBE_SAMPLES = 4
-MAX_DEPTH = 8
-FINEST_SHARE = 0.1
-"""The share of the samples whose reflections may be finer than the maps."""
-SMALLEST_MAP, LARGEST_MAP = 16, 4096
+LOBE_PROBE_SAMPLES = 16
+"""Samples per pixel of the trial images that measure a rough lobe's noise."""
+
+MAX_DEPTH = 16
+"""What fewer bounces are compared with."""
+BRIGHTEST_SHARE = 0.01
+"""The brightest pixels are clipped to the next ones, so that one mirrored sun does not decide alone."""
+
+MIRROR_SAMPLES = 16
+MOST_SAMPLES = 256
+"""Per pixel; a scene file may set more."""
+SMALLEST_MAP, LARGEST_MAP = 16, 1024
+"""A scene file may set other sizes."""
+TEXELS_PER_LOBE = 4
+"""Texels along a rough lobe's width at half of its height: more show nothing new."""
+
+LARGEST_BOX = 1e4
+"""Metres; hits further away are as good as infinite and do not shape the walls of a box."""
+MIN_HITS = 100
+"""Below this many reflected rays there is nothing to fit a shape to."""
+
+_SET = "set in the scene"
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing that a bake may do or leave, and why."""
-
-    subject: str
-    needed: bool
-    reason: str
-
-
-@dataclass(frozen=True)
-class Analysis:
-    """What a scene requires. The scene file's own settings stay in force: this is advice."""
-
-    layers: list[Finding]
-    depth: int
-    """Specular bounces after the first that change the images by more than the tolerance."""
-    depth_errors: list[float]
-    """Relative RMS change of the reflector's samples if bounces end after 0, 1, …, against the full depth."""
-    map_size: int
-    """Texels along a side of a cube face that the views can tell apart."""
-    reasons: list[str]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain values."""
-        return asdict(self)
-
-
-def analyze(config: SceneConfig, tolerance: float = 0.01) -> Analysis:
-    """Find out what a scene requires by a few small images.
+def analyze(stage: Stage) -> Plan:
+    """Decide what a bake of a scene does. What the scene file sets is obeyed, and only "auto" is measured.
 
     Parameters
     ----------
-    config
+    stage
         The scene.
-    tolerance
-        Relative change of the images that is worth no further bounce, in (0, 1).
 
     Raises
     ------
-    mirrorbake.InputError, mirrorbake.FileError, mirrorbake.InvalidArgument
-        The scene is not usable.
+    InputError
+        `maps.distant` names a finite shape, but the object sees no surroundings at a distance.
     """
-    if not 0.0 < tolerance < 1.0:
-        raise _core.InvalidArgument(f"tolerance is {tolerance}, expected more than 0 and less than 1")
-    stage = prepare_stage(config)
-    arc = stage.built.arc
-    times = [(i + 0.5) / PROBE_VIEWS for i in range(PROBE_VIEWS)]
-    layers = [_diffuse(stage), _local(stage, times), _glossy(stage)]
-    errors = _depth_errors(stage, _small(arc), times)
-    depth = next(d for d, error in enumerate(errors) if error <= tolerance)
-    size, step = _map_size(stage, times)
-    return Analysis(
-        layers,
+    trace = stage.config.trace
+    probe = _Probe.of(stage, MAX_DEPTH if trace.depth is None else trace.depth)
+    depth = _depth(stage, probe)
+    if depth.automatic and depth.value != MAX_DEPTH:
+        probe = _Probe.of(stage, int(depth.value))
+    distant, proxy = _distant(stage, probe)
+    decisions = [
         depth,
-        errors,
-        size,
-        [
-            f"ending after {depth} further bounces changes the reflections by {errors[depth]:.2%}"
-            + (f", one fewer by {errors[depth - 1]:.2%}" if depth else ""),
-            f"neighbouring pixels reflect directions {math.degrees(step):.2g} degrees apart where the views "
-            f"are finest; a texel of the face's middle is {math.degrees(2.0 / size):.2g}",
-        ],
+        _samples(stage, int(depth.value)),
+        _diffuse(stage, probe),
+        *_local(stage, probe),
+        distant,
+        _map_size(stage, proxy),
+    ]
+    return Plan(tuple(decisions), proxy_to_attributes(proxy))
+
+
+def _probe_times(stage: Stage) -> list[float]:
+    count = min(PROBE_VIEWS, stage.config.views.count)
+    return [float(t) for t in np.linspace(0.0, 1.0, count)]
+
+
+@dataclass(frozen=True)
+class _Probe:
+    """Samples of small images of a few views, one after the other."""
+
+    view: NDArray[np.int32]
+    pixel: NDArray[np.int64]
+    """Numbered through all views."""
+    part: NDArray[np.int64]
+    triangle: NDArray[np.int64]
+    position: FloatArray
+    reflection: FloatArray
+    beauty: DoubleArray
+    diffuse: DoubleArray
+    fresnel: DoubleArray
+    local: DoubleArray
+    distant: DoubleArray
+
+    @staticmethod
+    def of(stage: Stage, depth: int, samples_per_pixel: int = PROBE_SAMPLES) -> _Probe:
+        width, height = stage.built.arc.size
+        scale = min(1.0, PROBE_SIDE / max(width, height))
+        size = (max(1, round(scale * width)), max(1, round(scale * height)))
+        arc = replace(stage.built.arc, size=size)
+        # The same random numbers at every depth: what differs are the bounces alone.
+        options = _core.TraceOptions(
+            samples_per_pixel=samples_per_pixel, max_specular_depth=depth, seed=stage.config.trace.seed
+        )
+        traces = [
+            stage.tracer.trace_layers(arc.camera(t), stage.built.reflector, options)
+            for t in _probe_times(stage)
+        ]
+
+        def joined(name: str) -> NDArray[np.float32]:
+            return np.concatenate([np.asarray(getattr(trace.samples, name)) for trace in traces])
+
+        counts = [len(trace.samples) for trace in traces]
+        view = np.repeat(np.arange(len(traces), dtype=np.int32), counts)
+        return _Probe(
+            view=view,
+            pixel=joined("pixel").astype(np.int64) + view.astype(np.int64) * (size[0] * size[1]),
+            part=joined("part").astype(np.int64),
+            triangle=joined("triangle").astype(np.int64),
+            position=joined("position"),
+            reflection=joined("reflection"),
+            beauty=np.concatenate([np.asarray(trace.sample_beauty) for trace in traces]).astype(np.float64),
+            diffuse=joined("diffuse").astype(np.float64),
+            fresnel=joined("fresnel").astype(np.float64),
+            local=joined("local").astype(np.float64),
+            distant=joined("distant").astype(np.float64),
+        )
+
+    @property
+    def incident(self) -> DoubleArray:
+        """Radiance that arrives along the reflected rays."""
+        incident: DoubleArray = self.local[:, :3] + (1.0 - self.local[:, 3:]) * self.distant
+        return incident
+
+
+def _pixel_means(values: DoubleArray, pixel: NDArray[np.int64]) -> DoubleArray:
+    _, place, count = np.unique(pixel, return_inverse=True, return_counts=True)
+    sums = [np.bincount(place, weights=values[:, c], minlength=len(count)) for c in range(values.shape[1])]
+    means: DoubleArray = np.stack(sums, axis=-1) / count[:, None]
+    return means
+
+
+def _change(with_it: DoubleArray, without: DoubleArray, pixel: NDArray[np.int64]) -> float:
+    """Relative RMS change of the pixels, the brightest clipped."""
+    if not len(pixel):
+        return 0.0
+    a, b = _pixel_means(with_it, pixel), _pixel_means(without, pixel)
+    # A picture that is black but for a few pixels is judged by those.
+    limit = np.quantile(a, 1.0 - BRIGHTEST_SHARE) or np.inf
+    a, b = np.minimum(a, limit), np.minimum(b, limit)
+    scale = float(np.sqrt(np.mean(a * a)))
+    return float(np.sqrt(np.mean((a - b) ** 2))) / scale if scale > 0.0 else 0.0
+
+
+def _depth(stage: Stage, full: _Probe) -> Decision:
+    config = stage.config
+    if config.trace.depth is not None:
+        return Decision("trace.depth", None, config.trace.depth, False, _SET, None)
+    # The change shrinks with every bounce that is followed: bisection finds where it is small enough.
+    changes = {MAX_DEPTH: 0.0}
+    too_few, depth = -1, MAX_DEPTH
+    while depth - too_few > 1:
+        middle = (too_few + depth) // 2
+        changes[middle] = _change(full.beauty, _Probe.of(stage, middle).beauty, full.pixel)
+        if changes[middle] <= config.auto.tolerance:
+            depth = middle
+        else:
+            too_few = middle
+    fewer = f"one fewer by {changes[depth - 1]:.2%}" if depth else ""
+    if depth == MAX_DEPTH:
+        reason = f"the most that is tried; {fewer}"
+    else:
+        reason = f"ending after {_bounces(depth)} changes the picture by {changes[depth]:.2%}"
+        reason += f", {fewer}" if fewer else ""
+    return Decision("trace.depth", None, depth, True, reason, changes[depth])
+
+
+def _bounces(depth: int) -> str:
+    return {0: "the first reflection", 1: "1 further bounce"}.get(depth, f"{depth} further bounces")
+
+
+def _samples(stage: Stage, depth: int) -> Decision:
+    config, material = stage.config, _material(stage)
+    if config.trace.samples is not None:
+        return Decision("trace.samples", None, config.trace.samples, False, _SET, None)
+    if material.lobe == _core.SpecularLobe.mirror:
+        reason = "a mirror needs one direction per sample, so that samples only smooth edges"
+        return Decision("trace.samples", None, MIRROR_SAMPLES, True, reason, None)
+    probe = _Probe.of(stage, depth, LOBE_PROBE_SAMPLES)
+    spread = _relative_spread(probe.incident, probe.pixel)
+    wanted = max((spread / config.auto.noise) ** 2, 1.0)
+    samples = min(max(2 ** math.ceil(math.log2(wanted)), MIRROR_SAMPLES), MOST_SAMPLES)
+    reason = (
+        f"samples of a pixel differ by {spread:.0%} since each takes one direction of the "
+        f"{material.lobe.name} lobe; {samples} leave a noise of {spread / math.sqrt(samples):.1%}"
     )
+    return Decision("trace.samples", None, samples, True, reason, spread)
 
 
-def _diffuse(stage: Stage) -> Finding:
+def _relative_spread(values: DoubleArray, pixel: NDArray[np.int64]) -> float:
+    """Standard deviation of a pixel's samples over the RMS of the pixels, the brightest clipped."""
+    _, place, count = np.unique(pixel, return_inverse=True, return_counts=True)
+    several = count[place] > 1
+    if not several.any():
+        return 0.0
+    clipped = np.minimum(values[several], np.quantile(values[several], 1.0 - BRIGHTEST_SHARE))
+    means = _pixel_means(clipped, pixel[several])
+    _, place, count = np.unique(pixel[several], return_inverse=True, return_counts=True)
+    squares = np.sum((clipped - means[place]) ** 2, axis=1)
+    variance = np.bincount(place, weights=squares) / (3.0 * (count - 1))
+    scale = float(np.sqrt(np.mean(means * means)))
+    return float(np.sqrt(np.mean(variance))) / scale if scale > 0.0 else 0.0
+
+
+def _diffuse(stage: Stage, probe: _Probe) -> Decision:
+    config = stage.config
+    if config.layers.diffuse is not None:
+        return Decision("layers.diffuse", None, config.layers.diffuse, False, _SET, None)
     material = _material(stage)
-    if any(material.emission):
-        return Finding("diffuse", True, "the material emits light")
-    if any(material.albedo):
-        return Finding("diffuse", True, "the albedo is not black")
-    return Finding("diffuse", False, "the albedo is black")
+    if not any(material.albedo) and not any(material.emission):
+        reason = "the material is black under its mirror"
+        return Decision("layers.diffuse", None, False, True, reason, 0.0)
+    change = _change(probe.beauty, probe.beauty - probe.diffuse, probe.pixel)
+    reason = f"leaving it out changes the picture by {change:.2%}"
+    return Decision("layers.diffuse", None, change > config.auto.tolerance, True, reason, change)
 
 
-def _local(stage: Stage, times: list[float]) -> Finding:
-    built = stage.built
-    on_hull = np.asarray(_core.hull_triangles(built.positions, built.triangles)).astype(bool)
-    seen = np.concatenate([np.asarray(stage.visibility(t).triangle) for t in times])
-    if not len(seen):
-        return Finding("local", False, "no view sees the object")
-    share = float(1.0 - on_hull[seen].mean())
-    if share == 0.0:
-        return Finding("local", False, "all that the views see lies on the convex hull")
-    return Finding("local", True, f"{share:.1%} of what the views see lies inside of the convex hull")
+def _local(stage: Stage, probe: _Probe) -> list[Decision]:
+    config, built = stage.config, stage.built
+    if config.layers.local is not None:
+        return [Decision("layers.local", None, config.layers.local, False, _SET, None)]
+    on_hull = hull_triangles(built.positions, built.triangles)
+    without = probe.diffuse + probe.fresnel * probe.distant
+    decisions = []
+    for number, name in enumerate(built.part_names):
+        chosen = probe.part == number
+        inside = ~on_hull[probe.triangle[chosen]]
+        if not chosen.any():
+            value, change, reason = False, 0.0, "no view sees it"
+        elif not inside.any():
+            value, change, reason = False, 0.0, "all that the views see of it lies on the convex hull"
+        else:
+            change = _change(probe.beauty[chosen], without[chosen], probe.pixel[chosen])
+            value = change > config.auto.tolerance
+            share = float(np.mean(probe.local[chosen, 3]))
+            reason = (
+                f"what the object reflects of itself changes the picture by {change:.2%}: {share:.1%} of the "
+                f"rays meet it again; {float(inside.mean()):.0%} of what is seen is off the convex hull"
+            )
+        decisions.append(Decision("layers.local", name, value, True, reason, change))
+    return decisions
 
 
-def _glossy(stage: Stage) -> Finding:
-    lobe = _material(stage).lobe
-    if lobe == _core.SpecularLobe.mirror:
-        return Finding("glossy", False, "the material is a mirror: one direction per sample is all there is")
-    return Finding("glossy", True, f"the lobe is {lobe.name}: samples choose a direction in it")
+def _distant(stage: Stage, probe: _Probe) -> tuple[Decision, _core.Proxy]:
+    maps, built = stage.config.maps, stage.built
+    origin = _core.area_weighted_centroid(built.positions, built.triangles)
+    wanted = maps.distant
+    if wanted == "infinite":
+        return Decision("maps.distant", None, wanted, False, _SET, None), _core.Proxy.infinite(origin)
+    distances, _ = stage.tracer.intersect_distance(probe.position, probe.reflection, [built.reflector])
+    usable = distances > 0.0
+    near = usable & (distances < LARGEST_BOX)
+    if int(near.sum()) < MIN_HITS:
+        if wanted is not None:
+            raise InputError(
+                f"maps.distant = {wanted!r}: the object sees no surroundings at a distance to fit it to"
+            )
+        reason = "the object sees no surroundings at a distance"
+        return Decision("maps.distant", None, "infinite", True, reason, None), _core.Proxy.infinite(origin)
+    choice = choose_proxy(
+        np.ascontiguousarray(probe.position[usable]),
+        np.ascontiguousarray(probe.reflection[usable]),
+        np.ascontiguousarray(distances[usable]),
+        np.ascontiguousarray(probe.view[usable]),
+        origin,
+    )
+    best = choice.best
+    if wanted is not None:
+        best = next(candidate for candidate in choice.candidates if candidate.name == wanted)
+    proxy = best.proxy
+    if best.name == "box" and maps.box != "angle":
+        hits = probe.position[near] + distances[near, None] * probe.reflection[near]
+        proxy = _fit_box(maps.box, hits, origin, float(built.positions[:, 1].min()))
+    if wanted is not None:
+        return Decision("maps.distant", None, wanted, False, _SET, None), proxy
+    reason = choice.reason.removeprefix(f"{best.name}: ").removesuffix(".")
+    return Decision("maps.distant", None, best.name, True, reason, best.off_view_error), proxy
+
+
+def _fit_box(how: str, hits: FloatArray, origin: Sequence[float], bottom: float) -> _core.Proxy:
+    if how == "mean_distance":
+        return _core.fit_box_mean_distance(hits, origin, bottom)
+    return _core.fit_box_robust(hits, origin)
+
+
+def _map_size(stage: Stage, proxy: _core.Proxy) -> Decision:
+    config = stage.config
+    if config.maps.size is not None:
+        return Decision("maps.size", None, config.maps.size, False, _SET, None)
+    share = config.auto.finer_share
+    steps = _lookup_steps(stage, proxy)
+    if not len(steps):
+        return Decision("maps.size", None, SMALLEST_MAP, True, "no view sees the object", None)
+    step = float(np.quantile(steps, share))
+    reason = f"all but {share:.0%} of the pixels read places at least {math.degrees(step):.2g} degrees apart"
+    width = _lobe_width(_material(stage)) / TEXELS_PER_LOBE
+    if width > step:
+        step = width
+        reason = (
+            f"the lobe is {math.degrees(TEXELS_PER_LOBE * width):.2g} degrees wide and blurs what is finer"
+        )
+    # A cube face spans 2 at distance 1: in its middle a texel is 2/size radians wide.
+    wanted = 2 ** math.ceil(math.log2(2.0 / step))
+    size = min(max(wanted, SMALLEST_MAP), LARGEST_MAP)
+    reason += f"; a texel is {math.degrees(2.0 / size):.2g}"
+    if wanted > LARGEST_MAP:
+        reason += f", since {LARGEST_MAP} is the most that is chosen automatically"
+    return Decision("maps.size", None, size, True, reason, step)
+
+
+def _lookup_steps(stage: Stage, proxy: _core.Proxy) -> DoubleArray:
+    """Angles between the places of the distant map that neighbouring pixels read, radians."""
+    # Differentials are extrapolated over a small part of a pixel, where lookups are close to linear.
+    part = 1.0 / 16.0
+    options = _core.TraceOptions(samples_per_pixel=1, seed=stage.config.trace.seed)
+    steps = []
+    for t in _probe_times(stage):
+        seen = stage.tracer.trace_visibility(stage.built.arc.camera(t), stage.built.reflector, options)
+        position, reflection = np.asarray(seen.position, float), np.asarray(seen.reflection, float)
+        still = np.zeros_like(position)
+        middle, right, below = (
+            _unit(proxy.lookup_float64(position + part * np.asarray(dp), reflection + part * np.asarray(dr)))
+            for dp, dr in (
+                (still, still),
+                (seen.dposition_dx, seen.dreflection_dx),
+                (seen.dposition_dy, seen.dreflection_dy),
+            )
+        )
+        area = np.linalg.norm(np.cross(right - middle, below - middle), axis=1)
+        steps.append(np.sqrt(area) / part)
+    angles = np.concatenate(steps)
+    return angles[angles > 0.0]
+
+
+def _unit(vectors: DoubleArray) -> DoubleArray:
+    unit: DoubleArray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return unit
+
+
+def _lobe_width(material: _core.Material) -> float:
+    """Full width at half of its height, radians, of a lobe along the normal; 0: a mirror, or not known."""
+    if material.roughness_texture.texture >= 0:
+        return 0.0
+    if material.lobe == _core.SpecularLobe.phong:
+        return 2.0 * math.acos(0.5 ** (1.0 / material.exponent))
+    if material.lobe == _core.SpecularLobe.ggx:
+        # The density of facets goes with (1 + tan²/α²)⁻², which is half at tan² = (√2 − 1)α²; reflection
+        # doubles angles.
+        return 4.0 * math.atan(material.roughness * math.sqrt(math.sqrt(2.0) - 1.0))
+    return 0.0
 
 
 def _material(stage: Stage) -> _core.Material:
     scene = stage.built.scene
     return scene.material(scene.object_material(stage.built.reflector))
-
-
-def _small(arc: Arc) -> Arc:
-    width, height = arc.size
-    scale = min(1.0, PROBE_SIDE / max(width, height))
-    return replace(arc, size=(max(1, round(scale * width)), max(1, round(scale * height))))
-
-
-def _depth_errors(stage: Stage, arc: Arc, times: list[float]) -> list[float]:
-    values = []
-    for depth in range(MAX_DEPTH + 1):
-        options = _core.TraceOptions(
-            samples_per_pixel=PROBE_SAMPLES, max_specular_depth=depth, seed=stage.config.trace.seed
-        )
-        # The same random numbers at every depth: what differs are the bounces alone.
-        traced = [stage.tracer.trace_layers(arc.camera(t), stage.built.reflector, options) for t in times]
-        values.append(np.concatenate([np.asarray(t.sample_beauty, dtype=np.float64) for t in traced]))
-    scale = float(np.sqrt(np.mean(values[-1] ** 2))) if values[-1].size else 0.0
-    if scale == 0.0:
-        return [0.0] * len(values)
-    return [float(np.sqrt(np.mean((v - values[-1]) ** 2))) / scale for v in values]
-
-
-def _map_size(stage: Stage, times: list[float]) -> tuple[int, float]:
-    steps = []
-    for t in times:
-        seen = stage.visibility(t)
-        dx, dy = np.asarray(seen.dreflection_dx), np.asarray(seen.dreflection_dy)
-        steps.append(np.sqrt(np.linalg.norm(np.cross(dx, dy), axis=1)))
-    angles = np.concatenate(steps)
-    angles = angles[angles > 0.0]
-    if not len(angles):
-        return SMALLEST_MAP, 2.0 / SMALLEST_MAP
-    step = float(np.quantile(angles, FINEST_SHARE))
-    # A cube face spans 2 at distance 1: in its middle a texel is 2/size radians wide.
-    size = 2 ** math.ceil(math.log2(2.0 / step))
-    return min(max(size, SMALLEST_MAP), LARGEST_MAP), step

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.errors import InputError, StoreError
+from mirrorbake.analyze import analyze
+from mirrorbake.errors import StoreError
 from mirrorbake.run_time import images_of_trace, proxy_from_attributes, proxy_to_attributes
 from mirrorbake.scene import hash_inputs, prepare_stage
 from mirrorbake.store import GROUP_NAME, Header, PemStore, Source, Timings, exclusive
@@ -19,21 +20,16 @@ from mirrorbake.store import GROUP_NAME, Header, PemStore, Source, Timings, excl
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from mirrorbake.config import SceneConfig
     from mirrorbake.metrics import FloatArray
+    from mirrorbake.plan import Plan
     from mirrorbake.scene import BuiltScene, Stage
 
 ProgressReport: TypeAlias = Callable[[int, int, str], None]
 """Called with steps done, steps in all, and what is going on."""
 
-PILOT_VIEWS = 5
-PILOT_SIDE = 128
-"""Views, and pixels along a side, of the trial traces that decide on layers and fit the distant box."""
-
-LARGEST_BOX = 1e4
-"""Metres; hits further away are as good as infinite and do not shape a box."""
+PlanReport: TypeAlias = Callable[["Plan"], None]
+"""Called with what was decided, before the first view."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +39,7 @@ class BakeSummary:
     views: int
     resumed: int
     """How many of the views were there already."""
+    plan: Plan
     clamped: int
     """Values of the maps that float16 could not hold."""
     notes: list[str]
@@ -54,6 +51,7 @@ def bake(
     directory: Path,
     progress: ProgressReport | None = None,
     stage: Stage | None = None,
+    on_plan: PlanReport | None = None,
 ) -> BakeSummary:
     """Bake a scene's PEM into a folder, or finish one that was interrupted.
 
@@ -67,6 +65,9 @@ def bake(
         Told about every view.
     stage
         The scene, if it has been prepared already.
+    on_plan
+        Told what is "auto" in the scene and was decided, before the first view; when resuming, what was
+        decided then.
 
     Raises
     ------
@@ -90,7 +91,12 @@ def bake(
             store = PemStore.open(directory, writable=True)
             store.remove_stray_files()
         else:
-            store = _create_store(stage, source, directory)
+            report(0, total, "finding out what the scene requires")
+            plan = analyze(stage)
+            store = _create_store(stage.planned(plan), plan, source, directory)
+        stage = stage.planned(store.header.plan)
+        if on_plan is not None:
+            on_plan(store.header.plan)
         done = store.completed()
         resumed = int(done.sum())
         capture = _core.build_cube_pyramid(store.read_capture())
@@ -101,7 +107,9 @@ def bake(
                 report(index, total, f"view {index + 1} of {total}")
                 clamped += baker.bake_view(index)
         report(total, total, f"{total} views")
-    return BakeSummary(views=total, resumed=resumed, clamped=clamped, notes=stage.built.notes)
+    return BakeSummary(
+        views=total, resumed=resumed, plan=store.header.plan, clamped=clamped, notes=stage.built.notes
+    )
 
 
 def _check_output(directory: Path, source: Source) -> None:
@@ -120,39 +128,30 @@ def _check_output(directory: Path, source: Source) -> None:
         raise StoreError(f"{directory}: is not empty and holds no PEM; expected a new or an empty folder")
 
 
-def _create_store(stage: Stage, source: Source, directory: Path) -> PemStore:
+def _create_store(stage: Stage, plan: Plan, source: Source, directory: Path) -> PemStore:
     config, built, tracer = stage.config, stage.built, stage.tracer
-    pilot = _run_pilot(stage)
-    origin = tuple(_core.area_weighted_centroid(built.positions, built.triangles))
-    box = _fit_box(config, pilot.hits, origin, built)
-    infinite = proxy_to_attributes(_core.Proxy.infinite(origin))
-    use_box = config.maps.distant == "box" or (
-        config.maps.distant == "auto" and config.surroundings.panorama is None
-    )
-    if use_box and box is None:
-        raise InputError(
-            "maps.distant = 'box': the object sees no surroundings at a distance to fit a box to"
-        )
-    distant = box if use_box and box is not None else infinite
+    origin = plan.distant["origin"]
     parts = []
     for number, name in enumerate(built.part_names):
         layers: dict[str, Any] = {}
-        shows_itself = pilot.local_parts[number]
-        if config.layers.local == "on" or (config.layers.local == "auto" and shows_itself):
+        if plan.has_local(name):
             layers["local"] = _local_ellipsoid(built, number)
-        layers["distant"] = distant
+        layers["distant"] = plan.distant
         parts.append({"name": name, "layers": layers})
-    size = config.maps.size
-    capture = tracer.capture_cube(origin, size, [built.reflector], stage.options)
+    capture = tracer.capture_cube(origin, plan.map_size, [built.reflector], stage.options)
     irradiance = None
-    if built.has_diffuse:
+    if plan.has_diffuse:
         irradiance = tracer.vertex_irradiance(built.reflector, DIFFUSE_RAYS, config.trace.seed)
     header = Header(
         source=source,
+        plan=plan,
         parameters=config.views.parameters(),
         parts=parts,
-        static={"infinite": infinite, "box": box},
-        map_size=size,
+        static={
+            "infinite": proxy_to_attributes(_core.Proxy.infinite(origin)),
+            "proxy": None if plan.distant["shape"] == "infinite" else plan.distant,
+        },
+        map_size=plan.map_size,
         precision=config.maps.precision,
         image_size=config.views.size,
     )
@@ -161,49 +160,6 @@ def _create_store(stage: Stage, source: Source, directory: Path) -> PemStore:
 
 DIFFUSE_RAYS = 1024
 """Gather rays per vertex of the diffuse layer."""
-
-
-@dataclass(frozen=True)
-class _Pilot:
-    local_parts: NDArray[np.bool_]
-    hits: FloatArray
-
-
-def _run_pilot(stage: Stage) -> _Pilot:
-    config, built = stage.config, stage.built
-    width, height = config.views.size
-    shrink = PILOT_SIDE / max(width, height)
-    options = stage.options
-    options.samples_per_pixel = 1
-    local = np.zeros(len(built.part_names), bool)
-    hits = []
-    for t in np.linspace(0.0, 1.0, min(PILOT_VIEWS, config.views.count)):
-        camera = built.arc.camera(float(t))
-        camera.width, camera.height = max(1, round(width * shrink)), max(1, round(height * shrink))
-        samples = stage.tracer.trace_layers(camera, built.reflector, options).samples
-        part = np.asarray(samples.part)
-        alpha = np.asarray(samples.local)[:, 3]
-        local |= np.bincount(part, weights=alpha > 0.0, minlength=local.size) > 0
-        distance = np.asarray(samples.hit_distance)
-        near = distance < LARGEST_BOX
-        points = np.asarray(samples.position)[near]
-        hits.append(points + distance[near, None] * np.asarray(samples.reflection)[near])
-    return _Pilot(local, np.concatenate(hits).astype(np.float32))
-
-
-MIN_BOX_HITS = 100
-
-
-def _fit_box(
-    config: SceneConfig, hits: FloatArray, origin: Sequence[float], built: BuiltScene
-) -> dict[str, Any] | None:
-    if len(hits) < MIN_BOX_HITS or config.surroundings.panorama is not None:
-        return None
-    if config.maps.box == "mean_distance":
-        box = _core.fit_box_mean_distance(hits, origin, float(built.positions[:, 1].min()))
-    else:
-        box = _core.fit_box_robust(hits, origin)
-    return proxy_to_attributes(box)
 
 
 def _local_ellipsoid(built: BuiltScene, part: int) -> dict[str, Any]:
@@ -219,7 +175,7 @@ class _ViewBaker:
         self._config = config
         self._store = store
         self._capture = capture
-        self._layout = _core.CubePyramidLayout(config.maps.size)
+        self._layout = _core.CubePyramidLayout(store.header.map_size)
         self._lookup = _core.LookupOptions(footprint_scale=config.infer.footprint_scale)
         self._solve = _core.SolveOptions(
             smoothness=config.infer.smoothness,
@@ -270,7 +226,7 @@ class _ViewBaker:
         if matrix.rows == 0:
             channels = target.shape[1]
             return np.zeros((self._layout.texels, channels), np.float32) if initial is None else initial
-        weights = _core.display_row_weights(matrix, self._config.trace.samples, target)
+        weights = _core.display_row_weights(matrix, self._stage.options.samples_per_pixel, target)
         solver = _core.MapSolver(matrix, weights, self._layout, self._solve)
         captured = layer == "distant" and self._config.infer.prior == "captured"
         texels, _ = solver.solve(target, self._capture if captured else None, initial)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from mirrorbake.bake import ProgressReport
     from mirrorbake.evaluate import Evaluation
+    from mirrorbake.plan import Plan
 
 app = typer.Typer(
     name="mirrorbake",
@@ -120,6 +121,42 @@ def _root(
     pass
 
 
+Views = Annotated[
+    int | None,
+    typer.Option("--views", metavar="N", help="Number of views on the arc. [default: views.count]"),
+]
+Size = Annotated[str | None, typer.Option("--size", metavar="WxH", help="Pixels. [default: views.size]")]
+Spp = Annotated[
+    int | None, typer.Option("--spp", metavar="N", help="Samples per pixel. [default: trace.samples]")
+]
+EmSize = Annotated[
+    int | None,
+    typer.Option("--em-size", metavar="N", help="Texels along a side of a map's face. [default: maps.size]"),
+]
+Seed = Annotated[int | None, typer.Option("--seed", metavar="N", help="[default: trace.seed]")]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Any key of the scene file: --set reflector.mesh=bunny.obj"
+    ),
+]
+
+
+def _overrides(assignments: list[str] | None, **values: Any) -> list[tuple[tuple[str, ...], Any]]:
+    """Join --set with the options that have names of their own; `views_count` stands for views.count."""
+    overrides = [_parse_set(text) for text in assignments or []]
+    for key, value in values.items():
+        if value is not None:
+            section, _, name = key.partition("_")
+            overrides.append(((section, name), value))
+    return overrides
+
+
+def _print_plan(plan: Plan) -> None:
+    for line in plan.lines():
+        messages.print(line, markup=False, soft_wrap=True)
+
+
 @app.command("bake")
 @reports_errors
 def bake_command(
@@ -133,52 +170,35 @@ def bake_command(
             show_default=False,
         ),
     ],
-    views: Annotated[
-        int | None,
-        typer.Option("--views", metavar="N", help="Number of views on the arc. [default: views.count]"),
-    ] = None,
-    size: Annotated[
-        str | None,
-        typer.Option("--size", metavar="WxH", help="Pixels. [default: views.size]"),
-    ] = None,
-    spp: Annotated[
-        int | None,
-        typer.Option("--spp", metavar="N", help="Samples per pixel. [default: trace.samples]"),
-    ] = None,
-    em_size: Annotated[
-        int | None,
-        typer.Option(
-            "--em-size", metavar="N", help="Texels along a side of a map's face. [default: maps.size]"
-        ),
-    ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", metavar="N", help="[default: trace.seed]")] = None,
-    assignments: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Any key of the scene file: --set reflector.mesh=bunny.obj"
-        ),
-    ] = None,
+    views: Views = None,
+    size: Size = None,
+    spp: Spp = None,
+    em_size: EmSize = None,
+    seed: Seed = None,
+    assignments: Assignments = None,
     threads: Threads = 0,
 ) -> None:
-    """Bake a scene's reflections into one set of environment maps per view of the arc."""
+    """Bake a scene's reflections into one set of environment maps per view of the arc.
+
+    What the scene leaves to be decided ("auto") is decided first and printed, as `analyze` does.
+    """
     from mirrorbake.bake import bake
     from mirrorbake.config import load_config
 
-    overrides = [_parse_set(text) for text in assignments or []]
-    for key, value in (
-        ("views.count", views),
-        ("views.size", None if size is None else _parse_size(size)),
-        ("trace.samples", spp),
-        ("maps.size", em_size),
-        ("trace.seed", seed),
-    ):
-        if value is not None:
-            section, name = key.split(".")
-            overrides.append(((section, name), value))
-    config = load_config(scene, overrides)
+    config = load_config(
+        scene,
+        _overrides(
+            assignments,
+            views_count=views,
+            views_size=None if size is None else _parse_size(size),
+            trace_samples=spp,
+            maps_size=em_size,
+            trace_seed=seed,
+        ),
+    )
     limit = _core.ThreadLimit(threads)
     with _progress() as add_bar:
-        summary = bake(config, out, add_bar("bake"))
+        summary = bake(config, out, add_bar("bake"), on_plan=_print_plan)
     del limit
     warnings = list(summary.notes)
     if summary.clamped:
@@ -195,31 +215,41 @@ def bake_command(
 @reports_errors
 def analyze_command(
     scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)],
-    tolerance: Annotated[
-        float,
-        typer.Option("--tolerance", help="Relative change of the images that is worth no further bounce."),
-    ] = 0.01,
+    views: Views = None,
+    size: Size = None,
+    spp: Spp = None,
+    em_size: EmSize = None,
+    seed: Seed = None,
+    assignments: Assignments = None,
     json: Json = False,
     threads: Threads = 0,
 ) -> None:
-    """Tell which layers, bounces and map resolution a scene requires, and why."""
+    """Tell what `bake` with the same options decides, and why: layers, bounces, samples, geometry, maps."""
     import json as json_module
 
     from mirrorbake.analyze import analyze
     from mirrorbake.config import load_config
+    from mirrorbake.scene import prepare_stage
 
+    config = load_config(
+        scene,
+        _overrides(
+            assignments,
+            views_count=views,
+            views_size=None if size is None else _parse_size(size),
+            trace_samples=spp,
+            maps_size=em_size,
+            trace_seed=seed,
+        ),
+    )
     limit = _core.ThreadLimit(threads)
-    analysis = analyze(load_config(scene, []), tolerance)
+    plan = analyze(prepare_stage(config))
     del limit
     if json:
-        print(json_module.dumps(analysis.to_json()))
+        typer.echo(json_module.dumps(plan.to_json(), indent=1))
         return
-    for layer in analysis.layers:
-        print(f"{layer.subject:8} {'yes' if layer.needed else 'no':4} {layer.reason}")
-    for subject, value, reason in zip(
-        ("depth", "maps.size"), (analysis.depth, analysis.map_size), analysis.reasons, strict=True
-    ):
-        print(f"{subject:9}{value:<5}{reason}")
+    for line in plan.lines():
+        typer.echo(line)
 
 
 @app.command("evaluate")

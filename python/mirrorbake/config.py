@@ -17,6 +17,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    PlainSerializer,
     ValidationError,
     field_validator,
     model_validator,
@@ -51,6 +52,17 @@ def _power_of_two(value: int) -> int:
         raise ValueError("Input should be a power of two")
     return value
 
+
+def _none_for_auto(value: Any) -> Any:
+    return None if value == "auto" else value
+
+
+def _auto_for_none(value: Any) -> Any:
+    return "auto" if value is None else value
+
+
+_AUTO = (BeforeValidator(_none_for_auto), PlainSerializer(_auto_for_none))
+"""Makes None of a file's "auto", and "auto" of None."""
 
 Vec3: TypeAlias = Annotated[tuple[float, float, float], BeforeValidator(_as_tuple)]
 """Three numbers."""
@@ -235,23 +247,32 @@ class Views(_Section):
 
 
 class Layers(_Section):
-    """[layers]: which layers the maps have."""
+    """[layers]: which layers the reflector gets. None stands for "auto" here and below."""
 
-    local: Literal["auto", "on", "off"] = "auto"
-    """The layer of the object's reflection in itself. `auto`: for the parts that show one in a trial trace;
-    `off`: a single map holds everything."""
+    diffuse: Annotated[bool | None, *_AUTO] = None
+    """What the body reflects and emits, as irradiance at the vertices. "auto": if it changes the picture."""
+    local: Annotated[bool | None, *_AUTO] = None
+    """Maps of the object's reflection in itself. "auto": for the parts whose picture it changes; without it
+    a single map per part holds everything."""
+
+
+DistantShape: TypeAlias = Literal[
+    "infinite", "sphere", "hemisphere", "box", "ellipsoid", "rotated box", "rotated ellipsoid"
+]
+"""What `choose_proxy` fits."""
 
 
 class Maps(_Section):
     """[maps]: the environment maps."""
 
-    size: MapSize = 256
-    """Texels along a side of a cube face, a power of two."""
-    distant: Literal["auto", "box", "infinite"] = "auto"
-    """Geometry of the distant layer. `auto`: a box in a room, infinite under a panorama."""
-    box: Literal["robust", "mean_distance"] = "robust"
-    """How the box is fitted to the surroundings that the object sees: by robust least squares, or with its
-    bottom below the object and the other sides at the mean distance ([PEM] §4)."""
+    size: Annotated[MapSize | None, *_AUTO] = None
+    """Texels along a side of a cube face, a power of two. "auto": what the views can tell apart."""
+    distant: Annotated[DistantShape | None, *_AUTO] = None
+    """Geometry of the distant layer. "auto": the simplest shape that predicts where reflected rays end."""
+    box: Literal["angle", "robust", "mean_distance"] = "angle"
+    """How a box is fitted to the surroundings that the object sees: to the angles under which the map's
+    origin sees them, as the other shapes are; to the walls by robust least squares; or with its bottom below
+    the object and the other sides at the mean distance ([PEM] §4)."""
     precision: Literal["float16", "float32"] = "float16"
     """Storage of the maps on disk."""
 
@@ -259,8 +280,10 @@ class Maps(_Section):
 class Trace(_Section):
     """[trace]: the ray tracer."""
 
-    samples: Annotated[int, Field(ge=1, le=65536)] = 16
-    """Per pixel."""
+    samples: Annotated[Annotated[int, Field(ge=1, le=65536)] | None, *_AUTO] = None
+    """Per pixel. "auto": 16, or as many as a rough reflector's lobe needs."""
+    depth: Annotated[Annotated[int, Field(ge=0, le=64)] | None, *_AUTO] = None
+    """Specular bounces after the first. "auto": as many as change the picture."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     indirect: Literal["none", "cached", "path"] = "cached"
     """Diffuse light from other diffuse surfaces."""
@@ -290,6 +313,17 @@ class Infer(_Section):
     """The solver stops when its gradient has shrunk to this fraction."""
 
 
+class Auto(_Section):
+    """[auto]: what the values that are "auto" are decided by."""
+
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.01
+    """Relative RMS change of the object's picture that is worth no layer and no bounce."""
+    noise: Annotated[float, Field(gt=0, lt=1)] = 0.05
+    """Relative RMS error of a pixel that the samples of a rough reflector may leave."""
+    finer_share: Annotated[float, Field(ge=0, lt=1)] = 0.1
+    """Share of the object's pixels whose reflections may be finer than the maps."""
+
+
 class SceneConfig(_Section):
     """A whole scene file."""
 
@@ -302,6 +336,7 @@ class SceneConfig(_Section):
     maps: Maps = Maps()
     trace: Trace = Trace()
     infer: Infer = Infer()
+    auto: Auto = Auto()
 
     @model_validator(mode="before")
     @classmethod

@@ -66,7 +66,7 @@ def open_pem(directory: Path, stage: Stage | None = None) -> OpenedPem:
     present = Source(source.library, source.config, hash_inputs(config))
     if present.fingerprint != source.fingerprint:
         raise StoreError(f"{directory}: its scene has changed ({present.difference_from(source)})")
-    stage = stage or prepare_stage(config)
+    stage = (stage or prepare_stage(config)).planned(store.header.plan)
     return OpenedPem(store, stage, RunTime(store, stage.built.triangles))
 
 
@@ -161,6 +161,7 @@ def evaluate(
             "display_transform": DISPLAY_TRANSFORM,
             "object_coverage": OBJECT_COVERAGE,
             "config": source.config,
+            "plan": pem.store.header.plan.to_json(),
             "inputs": source.inputs,
         },
     )
@@ -185,7 +186,7 @@ def _evaluate_between(pem: OpenedPem, t: float) -> ViewMetrics:
 
 def render_contenders(pem: OpenedPem, t: float, samples: _core.SurfaceSamples) -> dict[str, FloatArray]:
     """Draw the reflector with every contender that exists: radiance (H, W, 3) by name."""
-    names = [name for name in CONTENDERS if name != "static_box" or pem.run_time.has_box]
+    names = [name for name in CONTENDERS if name != "static_proxy" or pem.run_time.has_static_proxy]
     return {name: pem.run_time.render(name, t, samples) for name in names}
 
 

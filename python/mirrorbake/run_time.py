@@ -19,29 +19,41 @@ if TYPE_CHECKING:
     from mirrorbake.metrics import FloatArray
     from mirrorbake.store import Header, PemStore
 
-CONTENDERS = ("pem", "static_infinite", "static_box")
+CONTENDERS = ("pem", "static_infinite", "static_proxy")
 """What an evaluation compares with ray tracing, in the order of its tables."""
 
-TITLES = {"pem": "PEM", "static_infinite": "Static map at infinity", "static_box": "Static map on the box"}
+TITLES = {
+    "pem": "PEM",
+    "static_infinite": "Static map at infinity",
+    "static_proxy": "Static map on the PEM's geometry",
+}
 """How tables and pictures call the contenders."""
 
 
 def proxy_from_attributes(description: Mapping[str, Any]) -> _core.Proxy:
     """Return the proxy that a PEM's attributes describe."""
     shape, origin = description["shape"], description["origin"]
+    if shape == "infinite":
+        return _core.Proxy.infinite(origin)
+    centre, axes = description["centre"], np.array(description["axes"], np.float32)
     if shape == "box":
-        return _core.Proxy.box(description["centre"], description["half_extent"], origin)
-    if shape == "ellipsoid":
-        return _core.Proxy.ellipsoid(description["centre"], description["radii"], origin)
-    return _core.Proxy.infinite(origin)
+        return _core.Proxy.box(centre, description["half_extent"], origin, axes)
+    if shape == "hemisphere":
+        return _core.Proxy.hemisphere(centre, description["radius"], origin, axes)
+    return _core.Proxy.ellipsoid(centre, description["radii"], origin, axes)
 
 
 def proxy_to_attributes(proxy: _core.Proxy) -> dict[str, Any]:
-    """Inverse of `proxy_from_attributes`, for axis-aligned shapes."""
-    fields = {"infinite": (), "box": ("centre", "half_extent"), "ellipsoid": ("centre", "radii")}[proxy.kind]
+    """Inverse of `proxy_from_attributes`."""
+    fields = {
+        "infinite": (),
+        "box": ("centre", "half_extent", "axes"),
+        "ellipsoid": ("centre", "radii", "axes"),
+        "hemisphere": ("centre", "radius", "axes"),
+    }[proxy.kind]
     description: dict[str, Any] = {"shape": proxy.kind}
     for field in (*fields, "origin"):
-        description[field] = [float(x) for x in getattr(proxy, field)]
+        description[field] = np.asarray(getattr(proxy, field)).astype(float).tolist()
     return description
 
 
@@ -90,9 +102,9 @@ class RunTime:
         self._views: dict[int, dict[tuple[str, str], FloatArray]] = {}
 
     @property
-    def has_box(self) -> bool:
-        """Whether the static map on a finite box is a contender."""
-        return self._header.static["box"] is not None
+    def has_static_proxy(self) -> bool:
+        """Whether the static map on the distant layer's geometry is a contender: it is not at infinity."""
+        return self._header.static["proxy"] is not None
 
     def neighbours(self, t: float) -> tuple[int, int, float]:
         """Views on both sides of a parameter and the weight of the second.
@@ -133,7 +145,7 @@ class RunTime:
         if contender == "pem":
             parts = self._pem_parts(*self.neighbours(t))
         else:
-            parts = self._static_parts("infinite" if contender == "static_infinite" else "box")
+            parts = self._static_parts("infinite" if contender == "static_infinite" else "proxy")
         diffuse = None
         if self._irradiance is not None:
             diffuse = _core.diffuse_from_irradiance(samples, self.triangles, self._irradiance)
@@ -162,6 +174,5 @@ class RunTime:
         return {name: self.store.read_map(*name, index) for name in self._header.map_names()}
 
     def _static_parts(self, shape: str) -> list[_core.PartMaps]:
-        static = self._header.static
-        proxy = proxy_from_attributes(static["box"] if shape == "box" else static["infinite"])
+        proxy = proxy_from_attributes(self._header.static[shape])
         return [_core.PartMaps(proxy, self._static) for _ in self._header.parts]

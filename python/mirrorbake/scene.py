@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from mirrorbake.config import MaterialConfig, Reflector, SceneConfig, Surroundings, Views
     from mirrorbake.metrics import FloatArray
+    from mirrorbake.plan import Plan
 
 DEFAULT_ELEVATION_DEGREES = 20.0
 FRAME_FILL = 0.9
@@ -68,7 +69,6 @@ class BuiltScene:
     parts: NDArray[np.uint16]
     """(T,) part of every triangle."""
     part_names: list[str]
-    has_diffuse: bool
     arc: Arc
     notes: list[str]
     """What the user should know about the inputs, such as values that had to be changed."""
@@ -111,7 +111,6 @@ def build_scene(config: SceneConfig) -> BuiltScene:
     else:
         reflector = _scene_reflector(config, scene)
         mesh, part_names = scene.object_mesh(reflector), scene.object_part_names(reflector)
-    shiny = scene.material(scene.object_material(reflector))
     positions = np.asarray(mesh.positions)
     triangles = np.asarray(mesh.triangles)
     parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
@@ -129,7 +128,6 @@ def build_scene(config: SceneConfig) -> BuiltScene:
         triangles=triangles,
         parts=parts,
         part_names=part_names,
-        has_diffuse=any(shiny.albedo) or any(shiny.emission),
         arc=arc,
         notes=notes,
     )
@@ -147,7 +145,15 @@ class Stage:
     def options(self) -> _core.TraceOptions:
         """Options of every view. All views share the seed: a view is the same in every bake."""
         trace = self.config.trace
-        return _core.TraceOptions(samples_per_pixel=trace.samples, seed=trace.seed)
+        assert trace.samples is not None, "the scene has to be planned first"
+        assert trace.depth is not None, "the scene has to be planned first"
+        return _core.TraceOptions(
+            samples_per_pixel=trace.samples, max_specular_depth=trace.depth, seed=trace.seed
+        )
+
+    def planned(self, plan: Plan) -> Stage:
+        """Return the stage with what a plan decides in place of "auto", so that its views can be traced."""
+        return replace(self, config=plan.resolve(self.config))
 
     def visibility(self, t: float) -> _core.SurfaceSamples:
         """Where the camera of t sees the reflector."""

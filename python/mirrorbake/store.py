@@ -19,7 +19,8 @@ array                       shape             holds
 LAYER is `local` (RGBA, premultiplied by α) or `distant` (RGB). Row 0 is the top. A coarser level l, of
 (S >> l)² texels a face, is its residual plus the mean over each 2×2 block, repeated l times, of `finest`
 ([PEM] §4). The group's attribute `mirrorbake` holds the format's version, the scene, its input files with
-their hashes, the parameter of every view, and each part's proxy geometry and origins.
+their hashes, what was decided before the bake and why, the parameter of every view, and each part's proxy
+geometry and origins.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ import zarr.errors
 from zarr.codecs import BloscCodec, BloscShuffle
 
 from mirrorbake.errors import StoreError
+from mirrorbake.plan import Plan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -48,7 +50,7 @@ if TYPE_CHECKING:
 
     from mirrorbake.metrics import FloatArray
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 GROUP_NAME = "pem.zarr"
 ATTRIBUTE = "mirrorbake"
 LARGEST_HALF = 65504.0
@@ -189,16 +191,24 @@ class Header:
     """What the attributes of a PEM say."""
 
     source: Source
+    plan: Plan
+    """What was decided before the bake; a resumed one keeps to it."""
     parameters: list[float]
     """t of every view, in [0,1]."""
     parts: list[dict[str, Any]]
     """Per part of the reflector, in order: name, and layers as {layer name: proxy}."""
     static: dict[str, Any]
-    """Proxies of the static maps: infinite, and box or None."""
+    """Proxies of the static maps: `infinite`, and `proxy`: the distant layer's, None if that is infinite."""
     map_size: int
     precision: Literal["float16", "float32"]
     image_size: tuple[int, int]
     """Pixels: width, height."""
+
+    @property
+    def fingerprint(self) -> str:
+        """Changes with everything that decides what a bake computes: its source and its plan."""
+        text = json.dumps([self.source.fingerprint, self.plan.to_json()], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
 
     def to_attributes(self) -> dict[str, Any]:
         """Return the JSON-like value of the group's attribute."""
@@ -206,7 +216,7 @@ class Header:
             "format": "pem",
             "format_version": FORMAT_VERSION,
             "library": self.source.library,
-            "fingerprint": self.source.fingerprint,
+            "fingerprint": self.fingerprint,
             "conventions": {
                 "world": "right-handed, +Y up, metres",
                 "radiance": "scene-linear, Rec.709 primaries",
@@ -221,6 +231,7 @@ class Header:
             "parts": self.parts,
             "static": self.static,
             "config": self.source.config,
+            "plan": self.plan.to_json(),
             "inputs": self.source.inputs,
         }
 
@@ -230,6 +241,7 @@ class Header:
         width, height = attributes["image_size"]
         return Header(
             source=Source(attributes["library"], attributes["config"], attributes["inputs"]),
+            plan=Plan.from_json(attributes["plan"]),
             parameters=list(attributes["parameters"]),
             parts=attributes["parts"],
             static=attributes["static"],
@@ -347,6 +359,8 @@ class PemStore:
             if version != FORMAT_VERSION:
                 raise StoreError(f"{path}: format version {version}, this library reads {FORMAT_VERSION}")
             header = Header.from_attributes(attributes)
+            if header.fingerprint != attributes["fingerprint"]:
+                raise StoreError(f"{path}: damaged: what it was made from does not match its fingerprint")
         except (OSError, KeyError, TypeError, ValueError, zarr.errors.BaseZarrError) as failure:
             if isinstance(failure, StoreError):
                 raise

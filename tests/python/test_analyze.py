@@ -1,107 +1,235 @@
-"""What a scene requires, for scenes of which it is known."""
+"""What a scene requires, for scenes of which it is known, and that a bake keeps to it."""
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from mirrorbake import _core
-from mirrorbake.analyze import MAX_DEPTH, analyze
-from mirrorbake.cli import app
-from mirrorbake.config import load_config
+from mirrorbake.analyze import LARGEST_MAP, MAX_DEPTH, MIRROR_SAMPLES, MOST_SAMPLES, SMALLEST_MAP, analyze
+from mirrorbake.bake import bake
+from mirrorbake.config import parse_config
+from mirrorbake.errors import InputError
+from mirrorbake.evaluate import open_pem
+from mirrorbake.scene import prepare_stage
+
+from .gltf_scene import SQUARE, SQUARE_TRIANGLES, GlbScene
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from mirrorbake.plan import Decision, Plan
+    from mirrorbake.scene import Stage
 
-def scene_file(folder: Path, mesh: _core.TriangleMesh, albedo: tuple[float, float, float]) -> Path:
-    """Write a scene of a mesh under a panorama, seen from a quarter circle."""
+CONVEX = _core.make_box((-0.5, 0, -0.5), (0.5, 1, 0.5))
+RING = _core.make_torus((0, 0.5, 0), 0.6, 0.3, 48)
+BALL = _core.make_sphere((0, 0.5, 0), 0.5, 96)
+
+SET = "set in the scene"
+
+
+def make_stage(folder: Path, mesh: _core.TriangleMesh, **sections: dict[str, Any]) -> Stage:
+    """Prepare a mesh of 1 m under a sky that is brighter above, seen from a quarter circle."""
     lines = [f"v {x} {y} {z}" for x, y, z in mesh.positions.tolist()]
     lines += ["f " + " ".join(str(i + 1) for i in t) for t in mesh.triangles.tolist()]
     (folder / "mesh.obj").write_text("\n".join(lines) + "\n")
-
     rows = np.linspace(0.2, 2.0, 16, dtype=np.float32)[:, None, None]
-    _core.save_image(
-        str(folder / "sky.exr"), np.ascontiguousarray(np.broadcast_to(rows, (16, 32, 3))), ["R", "G", "B"]
-    )
-    path = folder / "scene.toml"
-    path.write_text(
-        f"""[reflector]
-mesh = "mesh.obj"
-height = 1.0
-[material]
-fresnel = "constant"
-r0 = [0.9, 0.9, 0.9]
-albedo = {list(albedo)}
-[surroundings]
-panorama = "sky.exr"
-[views]
-count = 3
-size = [64, 64]
-[trace]
-indirect = "none"
-samples = 4
-"""
-    )
-    return path
+    sky = np.ascontiguousarray(np.broadcast_to(rows, (16, 32, 3)))
+    _core.save_image(str(folder / "sky.exr"), sky, ["R", "G", "B"])
+    scene: dict[str, dict[str, Any]] = {
+        "reflector": {"mesh": str(folder / "mesh.obj"), "height": 1.0},
+        "material": {"fresnel": "constant", "r0": 0.9},
+        "surroundings": {"panorama": str(folder / "sky.exr")},
+        "views": {"count": 3, "size": [64, 64]},
+        "trace": {"indirect": "none", "samples": 4},
+    }
+    for name, section in sections.items():
+        scene[name] = {**scene.get(name, {}), **section}
+    return prepare_stage(parse_config(scene, "scene"))
 
 
-def found(folder: Path, mesh: Any, albedo: tuple[float, float, float] = (0, 0, 0)) -> Any:
-    return analyze(load_config(scene_file(folder, mesh, albedo), []))
+def of(plan: Plan, key: str) -> Decision:
+    return next(decision for decision in plan.decisions if decision.key == key)
 
 
 def test_a_convex_black_mirror_needs_the_distant_layer_alone(tmp_path: Path) -> None:
-    analysis = found(tmp_path, _core.make_box((-0.5, 0, -0.5), (0.5, 1, 0.5)))
-    assert {layer.subject: layer.needed for layer in analysis.layers} == {
-        "diffuse": False,
-        "local": False,
-        "glossy": False,
-    }
-    assert all(layer.reason for layer in analysis.layers)
+    plan = analyze(make_stage(tmp_path, CONVEX))
+    assert not plan.has_diffuse
+    assert "black" in of(plan, "layers.diffuse").reason
+    assert not plan.has_local("object")
+    assert "convex hull" in of(plan, "layers.local").reason
     # Nothing to reflect but the sky: the first reflection is the last.
-    assert analysis.depth == 0
-    assert analysis.depth_errors[0] == 0.0
+    assert plan.depth == 0
+    assert of(plan, "trace.depth").measured == 0.0
+    assert plan.distant["shape"] == "infinite"
 
 
 def test_a_ring_reflects_itself_and_paint_is_diffuse(tmp_path: Path) -> None:
-    analysis = found(tmp_path, _core.make_torus((0, 0.5, 0), 0.6, 0.3, 48), (0.5, 0.1, 0.1))
-    needed = {layer.subject: layer.needed for layer in analysis.layers}
-    assert needed == {"diffuse": True, "local": True, "glossy": False}
-    assert 1 <= analysis.depth < MAX_DEPTH
-    errors = analysis.depth_errors
-    assert errors[analysis.depth] <= 0.01 < errors[analysis.depth - 1]
-    assert errors[-1] == 0.0
+    plan = analyze(make_stage(tmp_path, RING, material={"albedo": [0.5, 0.1, 0.1]}))
+    assert plan.has_diffuse
+    assert plan.has_local("object")
+    for key in ("layers.diffuse", "layers.local"):
+        measured = of(plan, key).measured
+        assert measured is not None
+        assert measured > 0.03
+
+
+def test_bounces_end_where_they_change_the_picture_by_less_than_the_tolerance(tmp_path: Path) -> None:
+    depths = []
+    for tolerance in (0.3, 0.1, 0.01):
+        stage = make_stage(tmp_path, RING, auto={"tolerance": tolerance})
+        decision = of(analyze(stage), "trace.depth")
+        depths.append(int(decision.value))
+        assert decision.measured is not None
+        assert decision.measured <= tolerance
+        # The picture itself, to the depth that was found and to one that leaves nothing out.
+        exact, found = (beauty(stage, depth) for depth in (64, depths[-1]))
+        # 64² pixels of another number of samples measure the same to some tenths.
+        assert change(exact, found) < 2.0 * tolerance
+        if depths[-1]:
+            assert change(exact, beauty(stage, depths[-1] - 1)) > tolerance / 2.0
+    assert depths[0] <= depths[1] < depths[2] < MAX_DEPTH
+
+
+def beauty(stage: Stage, depth: int) -> Any:
+    options = _core.TraceOptions(samples_per_pixel=4, max_specular_depth=depth)
+    pictures = []
+    for t in (0.0, 0.5, 1.0):
+        trace = stage.tracer.trace_layers(stage.built.arc.camera(t), stage.built.reflector, options)
+        channels = list(trace.channels)
+        layers = np.asarray(trace.layers)
+        seen = layers[..., channels.index("coverage")] > 0.5
+        pictures.append(layers[seen][:, [channels.index(name) for name in "RGB"]])
+    return np.concatenate(pictures).astype(float)
+
+
+def change(exact: Any, other: Any) -> float:
+    return float(np.sqrt(np.mean((exact - other) ** 2) / np.mean(exact**2)))
 
 
 def test_map_size_follows_the_curvature_of_the_mirror(tmp_path: Path) -> None:
-    analysis = found(tmp_path, _core.make_sphere((0, 0.5, 0), 0.5, 96))
+    plan = analyze(make_stage(tmp_path, BALL))
     # On a sphere of radius r a pixel of p metres turns the normal by p/r and the reflection by twice that in
     # the middle of the image, more towards the rim: the sphere fills 0.9 of 64 pixels.
     step = 2 * (1 / 0.9 / 64) / 0.5
-    assert 2 / step / 2 <= analysis.map_size <= 2 * 2 / step
-    assert analysis.map_size == 2 ** round(math.log2(analysis.map_size))
+    assert 2 / step / 2 <= plan.map_size <= 2 * 2 / step
+    assert plan.map_size == 2 ** round(math.log2(plan.map_size))
 
 
-def test_the_command_prints_reasons_or_json(tmp_path: Path) -> None:
-    path = scene_file(tmp_path, _core.make_box((-0.5, 0, -0.5), (0.5, 1, 0.5)), (0, 0, 0))
-    runner = CliRunner()
-    table = runner.invoke(app, ["analyze", str(path)])
-    assert table.exit_code == 0, table.output
-    assert "convex hull" in table.stdout
-    printed = runner.invoke(app, ["analyze", str(path), "--json"])
-    report = json.loads(printed.stdout)
-    assert report["depth"] == 0
-    assert [layer["subject"] for layer in report["layers"]] == ["diffuse", "local", "glossy"]
-    assert runner.invoke(app, ["analyze", str(path), "--tolerance", "2"]).exit_code == 3
+def test_a_flat_mirror_asks_for_no_more_than_the_largest_map(tmp_path: Path) -> None:
+    plan = analyze(make_stage(tmp_path, CONVEX, views={"size": [2048, 2048], "count": 1}))
+    assert plan.map_size == LARGEST_MAP
+    assert str(LARGEST_MAP) in of(plan, "maps.size").reason
 
 
-@pytest.mark.parametrize("tolerance", [0.0, 1.0, math.nan])
-def test_a_tolerance_out_of_range_is_refused(tolerance: float, tmp_path: Path) -> None:
-    path = scene_file(tmp_path, _core.make_box((-0.5, 0, -0.5), (0.5, 1, 0.5)), (0, 0, 0))
-    with pytest.raises(_core.InvalidArgument, match="tolerance"):
-        analyze(load_config(path, []), tolerance)
+def shiny_ball(folder: Path, roughness: float) -> Stage:
+    """Prepare a ball of metal in a file, on a floor that is lit from one side."""
+    floor, metal = (
+        {"pbrMetallicRoughness": {"metallicFactor": factor, "roughnessFactor": rough}}
+        for factor, rough in ((0.0, 1.0), (1.0, roughness))
+    )
+    scene = GlbScene(materials=[floor, metal])
+    square = scene.add_mesh(5 * SQUARE, SQUARE_TRIANGLES, 0)
+    ball = scene.add_mesh(BALL.positions, BALL.triangles, 1, BALL.normals)
+    scene.nodes = [{"name": "floor", "mesh": square}, {"name": "ball", "mesh": ball}]
+    path = folder / "ball.glb"
+    scene.write(path)
+    panorama = np.full((16, 32, 3), 0.1, np.float32)
+    panorama[4:7, 8:16] = 3.0
+    _core.save_image(str(folder / "sky.exr"), panorama, ["R", "G", "B"])
+    config = {
+        "reflector": {"scene_object": "ball"},
+        "surroundings": {"scene": str(path), "panorama": str(folder / "sky.exr")},
+        "views": {"count": 2, "degrees": 10, "size": [96, 96]},
+        "trace": {"indirect": "none"},
+    }
+    return prepare_stage(parse_config(config, "scene"))
+
+
+def test_only_a_rough_reflector_gets_samples_for_its_lobe_and_only_it_gets_small_maps(tmp_path: Path) -> None:
+    mirror = analyze(shiny_ball(tmp_path, 0.0))
+    assert mirror.samples == MIRROR_SAMPLES
+    assert of(mirror, "trace.samples").measured is None
+    # Perceptual roughness: α is its square.
+    rough = analyze(shiny_ball(tmp_path, 0.7))
+    assert MIRROR_SAMPLES < rough.samples <= MOST_SAMPLES
+    assert "ggx" in of(rough, "trace.samples").reason
+    width = 4 * math.atan(0.49 * math.sqrt(math.sqrt(2) - 1))
+    assert SMALLEST_MAP <= rough.map_size < mirror.map_size
+    assert width / 8 <= 2 / rough.map_size <= width / 4 or rough.map_size == SMALLEST_MAP
+
+
+def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
+    stage = make_stage(
+        tmp_path,
+        CONVEX,
+        layers={"diffuse": True, "local": True},
+        maps={"size": 32, "distant": "infinite"},
+        trace={"depth": 5},
+    )
+    plan = analyze(stage)
+    assert [decision.value for decision in plan.decisions] == [5, 4, True, True, "infinite", 32]
+    assert all(not decision.automatic and decision.reason == SET for decision in plan.decisions)
+    bake(stage.config, tmp_path / "pem", None, stage)
+    pem = open_pem(tmp_path / "pem", stage)
+    assert pem.store.header.map_names() == [("object", "local"), ("object", "distant")]
+    assert pem.stage.options.max_specular_depth == 5
+    # Asked for, though the material is black.
+    assert pem.store.read_irradiance() is not None
+
+
+def test_layers_that_are_left_out_are_not_missed(tmp_path: Path) -> None:
+    pictures = {}
+    for name, wanted in (("decided", "auto"), ("all", True)):
+        stage = make_stage(
+            tmp_path,
+            CONVEX,
+            layers={"diffuse": wanted, "local": wanted},
+            maps={"size": 32},
+            views={"count": 1},
+        )
+        bake(stage.config, tmp_path / name, None, stage)
+        pem = open_pem(tmp_path / name, stage)
+        pictures[name] = pem.run_time.render("pem", 0.0, pem.stage.visibility(0.0))
+        assert (pem.store.read_irradiance() is not None) == (wanted is True)
+        layers = [layer for _, layer in pem.store.header.map_names()]
+        assert layers == (["local", "distant"] if wanted is True else ["distant"])
+    assert pictures["all"].max() > 0.5
+    # float16 on disk; the maps' solution does not depend on layers that hold nothing.
+    np.testing.assert_allclose(pictures["decided"], pictures["all"], rtol=0, atol=1e-4)
+
+
+def test_a_finite_shape_needs_something_to_fit_it_to(tmp_path: Path) -> None:
+    stage = make_stage(tmp_path, CONVEX, maps={"distant": "hemisphere"})
+    with pytest.raises(InputError, match=r"maps\.distant = 'hemisphere'"):
+        analyze(stage)
+
+
+@pytest.mark.parametrize(
+    "shape", ["sphere", "hemisphere", "box", "ellipsoid", "rotated box", "rotated ellipsoid"]
+)
+def test_every_shape_of_the_distant_layer_is_baked_and_drawn(tmp_path: Path, shape: str) -> None:
+    ground = {"ground": {"radius": 3.0}}
+    stage = make_stage(
+        tmp_path, BALL, surroundings=ground, maps={"size": 64, "distant": shape}, views={"count": 1}
+    )
+    bake(stage.config, tmp_path / "pem", None, stage)
+    pem = open_pem(tmp_path / "pem", stage)
+    kinds = {"sphere": "ellipsoid", "rotated box": "box", "rotated ellipsoid": "ellipsoid"}
+    assert pem.store.header.plan.distant["shape"] == kinds.get(shape, shape)
+    drawn = pem.run_time.render("pem", 0.0, pem.stage.visibility(0.0))
+    images = pem.store.read_images(0)
+    seen = images.coverage > 0.9
+    # The smooth sky and its horizon.
+    assert np.sqrt(np.mean((drawn[seen] - images.object[seen]) ** 2)) < 0.05
+
+
+def test_a_reflector_that_no_view_sees_needs_nothing(tmp_path: Path) -> None:
+    plan = analyze(
+        make_stage(tmp_path, RING, views={"centre": [0.0, 50.0, 0.0], "radius": 1.0, "height": 0.0})
+    )
+    assert (plan.depth, plan.has_local("object"), plan.map_size) == (0, False, SMALLEST_MAP)
+    assert plan.distant["shape"] == "infinite"

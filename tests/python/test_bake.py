@@ -60,8 +60,8 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> Baked:
     directory = tmp_path_factory.mktemp("bake") / "pem"
     stage = prepare_stage(parse_config(SMALL, "small"))
     reports: list[tuple[int, int, str]] = []
-    bake(stage.config, directory, lambda *report: reports.append(report), stage)
-    return Baked(directory, stage, evaluate(directory, None, stage), reports)
+    summary = bake(stage.config, directory, lambda *report: reports.append(report), stage)
+    return Baked(directory, stage.planned(summary.plan), evaluate(directory, None, stage), reports)
 
 
 def mean(evaluation: Evaluation, contender: str, *, sampled: bool) -> float:
@@ -76,7 +76,7 @@ def test_the_pem_beats_both_static_maps_on_and_between_its_samples(baked: Baked)
     for sampled, lead in ((True, 8.0), (False, 6.0)):
         pem = mean(baked.evaluation, "pem", sampled=sampled)
         infinite = mean(baked.evaluation, "static_infinite", sampled=sampled)
-        box = mean(baked.evaluation, "static_box", sampled=sampled)
+        box = mean(baked.evaluation, "static_proxy", sampled=sampled)
         assert pem - infinite > lead
         assert pem - box > lead - 3.0
         assert box > infinite
@@ -84,7 +84,8 @@ def test_the_pem_beats_both_static_maps_on_and_between_its_samples(baked: Baked)
 
 def test_the_box_is_the_room_that_the_teapot_sees(baked: Baked) -> None:
     header = PemStore.open(baked.directory).header
-    box = header.static["box"]
+    box = header.static["proxy"]
+    assert box["shape"] == "box"
     assert [part["name"] for part in header.parts] == ["body", "lid"]
     for part in header.parts:
         assert part["layers"].keys() == {"local", "distant"}
@@ -195,9 +196,11 @@ def test_the_contact_sheet_is_a_picture_with_all_contenders(baked: Baked, tmp_pa
 
 def test_the_table_shows_means_and_marks_what_does_not_exist() -> None:
     views = [
-        ViewMetrics(0.0, True, 1.0, 2.0, 3.0, {"pem": 30.0, "static_infinite": 20.0, "static_box": None}),
-        ViewMetrics(0.5, False, 1.0, None, None, {"pem": 28.0, "static_infinite": 20.0, "static_box": None}),
-        ViewMetrics(1.0, True, 1.0, 2.0, 3.0, {"pem": 31.0, "static_infinite": 21.0, "static_box": None}),
+        ViewMetrics(0.0, True, 1.0, 2.0, 3.0, {"pem": 30.0, "static_infinite": 20.0, "static_proxy": None}),
+        ViewMetrics(
+            0.5, False, 1.0, None, None, {"pem": 28.0, "static_infinite": 20.0, "static_proxy": None}
+        ),
+        ViewMetrics(1.0, True, 1.0, 2.0, 3.0, {"pem": 31.0, "static_infinite": 21.0, "static_proxy": None}),
     ]
     output = io.StringIO()
     Console(file=output, width=120).print(metrics_table(Evaluation(views, {})))
@@ -222,14 +225,23 @@ def test_equal_images_are_null_in_json() -> None:
     assert figures["views"][0]["psnr"]["pem"] is None
 
 
+TURNED = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]], np.float32)
+
+
 def test_proxies_survive_the_attributes() -> None:
     for proxy in (
         _core.Proxy.infinite((1.0, 2.0, 3.0)),
+        _core.Proxy.box((0.0, 1.0, 0.0), (2.0, 1.0, 3.0), (0.0, 0.5, 0.0), TURNED),
+        _core.Proxy.ellipsoid((0.0, 1.0, 0.0), (2.0, 1.0, 3.0), (0.0, 0.5, 0.0), TURNED),
+        _core.Proxy.hemisphere((0.0, 1.0, 0.0), 4.0, (0.0, 1.5, 0.0), TURNED),
         _core.Proxy.box((0.0, 1.0, 0.0), (2.0, 1.0, 3.0), (0.0, 0.5, 0.0)),
         _core.Proxy.ellipsoid((0.0, 1.0, 0.0), (2.0, 1.0, 3.0), (0.0, 0.5, 0.0)),
     ):
         attributes = json.loads(json.dumps(proxy_to_attributes(proxy)))
-        assert repr(proxy_from_attributes(attributes)) == repr(proxy)
+        read = proxy_from_attributes(attributes)
+        assert repr(read) == repr(proxy)
+        points, rays = np.random.default_rng(1).normal(size=(2, 100, 3)).astype(np.float32)
+        np.testing.assert_array_equal(read.lookup(points, rays), proxy.lookup(points, rays))
 
 
 def make_sky(tmp_path: Path, *, sun: bool = True) -> Path:
@@ -246,7 +258,7 @@ def make_sky(tmp_path: Path, *, sun: bool = True) -> Path:
 def small_panorama_scene(tmp_path: Path, **sections: Any) -> dict[str, Any]:
     return {
         **SMALL,
-        "surroundings": {"panorama": str(make_sky(tmp_path)), "ground": {}},
+        "surroundings": {"panorama": str(make_sky(tmp_path))},
         "views": {"count": 2, "degrees": 1.0, "size": [96, 72]},
         "trace": {"samples": 4, "indirect": "none"},
         **sections,
@@ -257,10 +269,10 @@ def test_under_a_panorama_the_distant_map_lies_at_infinity(tmp_path: Path) -> No
     stage = prepare_stage(parse_config(small_panorama_scene(tmp_path), "panorama"))
     bake(stage.config, tmp_path / "pem", None, stage)
     header = PemStore.open(tmp_path / "pem").header
-    assert header.static["box"] is None
+    assert header.static["proxy"] is None
     assert all(part["layers"]["distant"]["shape"] == "infinite" for part in header.parts)
     evaluation = evaluate(tmp_path / "pem", None, stage)
-    assert all(view.psnr["static_box"] is None for view in evaluation.views)
+    assert all(view.psnr["static_proxy"] is None for view in evaluation.views)
     lead = mean(evaluation, "pem", sampled=True) - mean(evaluation, "static_infinite", sampled=True)
     assert lead > 3.0
     pem = open_pem(tmp_path / "pem", stage)
@@ -281,12 +293,12 @@ def test_a_convex_reflector_has_no_local_layer(tmp_path: Path) -> None:
 
 
 def test_without_a_local_layer_one_map_holds_everything(tmp_path: Path) -> None:
-    stage = prepare_stage(parse_config(small_panorama_scene(tmp_path, layers={"local": "off"}), "single"))
+    stage = prepare_stage(parse_config(small_panorama_scene(tmp_path, layers={"local": False}), "single"))
     bake(stage.config, tmp_path / "pem", None, stage)
     pem = open_pem(tmp_path / "pem", stage)
     assert {layer for _, layer in pem.store.header.map_names()} == {"distant"}
     images = pem.store.read_images(0)
-    drawn = pem.run_time.render("pem", 0.0, stage.visibility(0.0))
+    drawn = pem.run_time.render("pem", 0.0, pem.stage.visibility(0.0))
     assert psnr(drawn, images.object, images.coverage >= 0.5) > 20
 
 
@@ -303,12 +315,12 @@ def test_a_diffuse_body_under_a_coat_has_a_diffuse_layer(tmp_path: Path) -> None
     assert irradiance.shape == stage.built.positions.shape
     images = pem.store.read_images(0)
     mask = images.coverage >= 0.5
-    drawn = pem.run_time.render("pem", 0.0, stage.visibility(0.0))
+    drawn = pem.run_time.render("pem", 0.0, pem.stage.visibility(0.0))
     # Most of the light is diffuse: irradiance per vertex has to get it right.
     assert psnr(drawn, images.object, mask) > 25
     without = RunTime(pem.store, stage.built.triangles)
     without._irradiance = None
-    assert psnr(without.render("pem", 0.0, stage.visibility(0.0)), images.object, mask) < 20
+    assert psnr(without.render("pem", 0.0, pem.stage.visibility(0.0)), images.object, mask) < 20
 
 
 def test_clamped_radiance_is_counted(tmp_path: Path) -> None:

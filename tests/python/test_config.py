@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from mirrorbake.config import PATH_KEYS, SceneConfig, load_config, parse_config, parse_override
 from mirrorbake.errors import InputError
+from mirrorbake.plan import DECIDED_KEYS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,14 +20,37 @@ def test_an_empty_scene_is_the_teapot_in_its_room_at_the_papers_size() -> None:
     assert config.surroundings.room == "furnished"
     assert (config.views.count, config.views.degrees) == (100, 99.0)
     assert config.views.size == (512, 512)
-    assert config.maps.size == 256
-    assert config.trace.samples == 16
+    assert (config.maps.size, config.maps.distant) == (None, None)
+    assert (config.trace.samples, config.trace.depth) == (None, None)
+    assert (config.layers.diffuse, config.layers.local) == (None, None)
+
+
+def test_auto_is_a_value_of_every_key_that_is_decided_before_a_bake() -> None:
+    values: dict[str, bool | int | str] = {
+        "trace.depth": 3, "trace.samples": 2, "layers.diffuse": True,
+        "layers.local": False, "maps.distant": "rotated box", "maps.size": 64,
+    }  # fmt: skip
+    assert values.keys() == set(DECIDED_KEYS)
+    for key, value in values.items():
+        section, name = key.split(".")
+        explicit = parse_config({section: {name: value}}, "scene")
+        assert getattr(getattr(explicit, section), name) == value
+        automatic = parse_config({section: {name: "auto"}}, "scene")
+        assert automatic == parse_config({}, "scene")
+        # A PEM keeps the text, so that a bake with a value of its own is told from one that decides.
+        dumped = json.loads(automatic.model_dump_json())
+        assert dumped[section][name] == "auto"
+        assert parse_config(dumped, "PEM") == automatic
 
 
 @pytest.mark.parametrize(
     ("data", "message"),
     [
         ({"maps": {"size": 100}}, "scene: maps.size = 100: should be a power of two"),
+        ({"maps": {"size": "large"}}, "scene: maps.size = 'large': should be a valid integer"),
+        ({"layers": {"local": "on"}}, "scene: layers.local = 'on': should be a valid boolean"),
+        ({"trace": {"depth": 65}}, "scene: trace.depth = 65: should be less than or equal to 64"),
+        ({"auto": {"tolerance": 1.0}}, "scene: auto.tolerance = 1.0: should be less than 1"),
         ({"maps": {"size": 0}}, "scene: maps.size = 0: should be greater than or equal to 1"),
         ({"maps": {"size": 8192}}, "scene: maps.size = 8192: should be less than or equal to 4096"),
         ({"maps": {"size": 64.0}}, "scene: maps.size = 64.0: should be a valid integer"),

@@ -227,10 +227,10 @@ def test_an_object_of_a_gltf_scene_is_baked_where_it_stands(tmp_path: Path) -> N
     assert hash_inputs(config).keys() == {"surroundings.scene"}
     built = build_scene(config)
     assert built.scene.object_names[built.reflector] == "gem"
-    assert not built.has_diffuse
     np.testing.assert_allclose(built.positions.max(axis=0), (0.2, 0.7, 0.2), rtol=1e-6)
     summary = bake(config, tmp_path / "pem")
     assert summary.views == 2
+    assert not summary.plan.has_diffuse
     evaluation = evaluate(tmp_path / "pem")
     pem = evaluation.mean_psnr("pem", sampled=True)
     static = evaluation.mean_psnr("static_infinite", sampled=True)

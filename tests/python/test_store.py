@@ -12,6 +12,7 @@ import pytest
 import zarr
 
 from mirrorbake.errors import StoreError
+from mirrorbake.plan import Decision, Plan
 from mirrorbake.store import (
     GROUP_NAME,
     Header,
@@ -33,16 +34,26 @@ TEXELS = 6 * (64 + 16 + 4 + 1)
 HALF_ROUNDING = 2.0**-11
 
 
+def make_plan(samples: int = 4) -> Plan:
+    values: dict[str, bool | int | str] = {
+        "trace.depth": 2, "trace.samples": samples, "layers.diffuse": False,
+        "layers.local": True, "maps.distant": "infinite", "maps.size": SIZE,
+    }  # fmt: skip
+    decisions = (Decision(key, None, value, True, "measured", 0.25) for key, value in values.items())
+    return Plan(tuple(decisions), {"shape": "infinite", "origin": [0.0, 0.0, 0.0]})
+
+
 def make_header(**changes: Any) -> Header:
     proxy = {"shape": "infinite", "origin": [0.0, 0.0, 0.0]}
     header = Header(
         source=Source("1.2.3", {"maps": {"size": SIZE}, "reflector": {"mesh": "/a/cow.obj"}}, {}),
+        plan=make_plan(),
         parameters=[0.0, 0.5, 1.0],
         parts=[
             {"name": "body", "layers": {"local": proxy, "distant": proxy}},
             {"name": "lid", "layers": {"distant": proxy}},
         ],
-        static={"infinite": proxy, "box": None},
+        static={"infinite": proxy, "proxy": None},
         map_size=SIZE,
         precision="float16",
         image_size=(WIDTH, HEIGHT),
@@ -138,7 +149,7 @@ def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
     fill(make_store(tmp_path))
     group: Any = zarr.open_group(tmp_path / GROUP_NAME, mode="r")
     attributes: Any = group.attrs["mirrorbake"]
-    assert attributes["format_version"] == 1
+    assert attributes["format_version"] == 2
     sizes = attributes["conventions"]["level_sizes"]
     assert sizes == [8, 4, 2, 1]
     finest = np.asarray(group["maps/body/local/finest"][1], np.float32)
@@ -241,7 +252,7 @@ def test_damage_is_reported_with_the_place(tmp_path: Path) -> None:
     newer = json.loads(intact)
     newer["attributes"]["mirrorbake"]["format_version"] = 99
     metadata.write_text(json.dumps(newer))
-    with pytest.raises(StoreError, match="format version 99, this library reads 1"):
+    with pytest.raises(StoreError, match="format version 99, this library reads 2"):
         PemStore.open(tmp_path)
     metadata.write_text(intact)
     store = PemStore.open(tmp_path)
@@ -268,6 +279,26 @@ def test_the_fingerprint_follows_contents_and_not_places() -> None:
     assert other.fingerprint != original.fingerprint
     assert other.difference_from(original) == "maps.size = 8 instead of 16"
     assert source(config, "00", "2").difference_from(original) == "mirrorbake 1 instead of 2"
+
+
+def test_the_fingerprint_covers_what_was_decided(tmp_path: Path) -> None:
+    assert make_header().fingerprint == make_header().fingerprint
+    assert make_header(plan=make_plan(samples=8)).fingerprint != make_header().fingerprint
+    path = make_store(tmp_path).directory / GROUP_NAME / "zarr.json"
+    text = path.read_text()
+    changed = text.replace('"value": 4', '"value": 8')
+    assert changed != text
+    path.write_text(changed)
+    with pytest.raises(StoreError, match="does not match its fingerprint"):
+        PemStore.open(tmp_path)
+
+
+def test_a_plan_without_one_of_its_decisions_is_damaged() -> None:
+    data = make_plan().to_json()
+    assert Plan.from_json(data) == make_plan()
+    del data["decisions"][0]
+    with pytest.raises(KeyError, match=r"trace\.depth"):
+        Plan.from_json(data)
 
 
 def test_two_bakes_cannot_write_to_one_folder(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 from mirrorbake import _core
 from mirrorbake.cli import app
 from mirrorbake.config import load_config
+from mirrorbake.plan import DECIDED_KEYS
 from mirrorbake.store import GROUP_NAME, PemStore
 
 EXIT_USAGE, EXIT_INPUT = 2, 3
@@ -130,7 +131,7 @@ def test_a_process_ends_with_the_status_and_the_streams_of_the_manual(tmp_path: 
     assert len(json.loads(result.stdout)["views"]) == 1
 
 
-@pytest.mark.parametrize("command", ["bake", "evaluate", "render", "demo"])
+@pytest.mark.parametrize("command", ["bake", "analyze", "evaluate", "render", "demo"])
 def test_every_command_explains_itself(command: str) -> None:
     result = run(command, "--help")
     assert result.returncode == 0
@@ -322,6 +323,34 @@ def test_a_bake_that_is_killed_is_resumed_to_the_same_bits(baked: Path, tmp_path
     assert not list(out.rglob("*.partial"))
 
 
+def test_a_resumed_bake_keeps_to_what_was_decided_and_says_it(baked: Path, tmp_path: Path) -> None:
+    plan = PemStore.open(baked).header.plan
+    result = run("bake", write_scene(tmp_path), "--out", baked)
+    for line in plan.lines():
+        assert line in result.stderr
+    assert any(decision.automatic for decision in plan.decisions)
+    # A value of one's own is another scene, even if it is the one that was decided.
+    depth = f"trace.depth={plan.depth}"
+    other = run("bake", write_scene(tmp_path), "--out", baked, "--set", depth)
+    assert_one_error(other, f"trace.depth = 'auto' instead of {plan.depth}")
+
+
+def test_analyze_prints_exactly_what_a_bake_with_the_same_options_does(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path)
+    options = ["--views", "1", "--set", "maps.size=auto", "--set", "layers.local=false"]
+    analyzed = run("analyze", scene, *options)
+    assert (analyzed.returncode, analyzed.stderr) == (0, "")
+    lines = analyzed.stdout.splitlines()
+    assert [line.split(" = ")[0] for line in lines] == list(DECIDED_KEYS)
+    assert "layers.local = false  # set in the scene" in lines
+    baked = run("bake", scene, "--out", tmp_path / "pem", *options)
+    assert baked.returncode == 0, baked.stderr
+    for line in lines:
+        assert line in baked.stderr.splitlines()
+    printed = run("analyze", scene, *options, "--json")
+    assert json.loads(printed.stdout) == PemStore.open(tmp_path / "pem").header.plan.to_json()
+
+
 def test_one_and_two_threads_bake_the_same_bits(tmp_path: Path) -> None:
     scene = write_scene(tmp_path)
     for threads in (1, 2):
@@ -356,7 +385,7 @@ def test_evaluate_writes_the_figures_it_prints(baked: Path) -> None:
     assert [view["t"] for view in views] == [0, 0.25, 0.5, 0.75, 1]
     assert [view["sampled"] for view in views] == [True, False, True, False, True]
     for view in views:
-        assert view["psnr"].keys() == {"pem", "static_infinite", "static_box"}
+        assert view["psnr"].keys() == {"pem", "static_infinite", "static_proxy"}
         assert all(5 < value < 80 for value in view["psnr"].values())
         assert view["trace_s"] > 0
         assert (view["build_s"] is None) == (view["solve_s"] is None) == (not view["sampled"])

@@ -22,7 +22,8 @@ def test_the_teapot_example_is_the_papers_set_up() -> None:
     assert config.views.degrees / (config.views.count - 1) == 1.0
     assert (config.maps.size, config.views.size, config.trace.samples) == (256, (512, 512), 16)
     defaults = SceneConfig()
-    for section in ("reflector", "surroundings", "views", "layers", "trace", "infer"):
+    assert (config.layers.diffuse, config.layers.local, config.maps.distant) == (False, True, "box")
+    for section in ("reflector", "surroundings", "views", "infer"):
         assert getattr(config, section) == getattr(defaults, section)
 
 

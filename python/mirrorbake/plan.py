@@ -1,0 +1,113 @@
+"""What a bake does, decided before it starts: which layers, bounces, samples and maps (spec T6)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from mirrorbake.config import SceneConfig
+
+DECIDED_KEYS = (
+    "trace.depth",
+    "trace.samples",
+    "layers.diffuse",
+    "layers.local",
+    "maps.distant",
+    "maps.size",
+)
+"""Keys of a scene file that may be "auto", in the order in which they are decided."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The value of one key, and why."""
+
+    key: str
+    """Of the scene file: one of `DECIDED_KEYS`."""
+    part: str | None
+    """The part of the reflector that it is about; None: all."""
+    value: bool | int | str
+    automatic: bool
+    """False: the scene file sets the value."""
+    reason: str
+    """With the number that was measured, for people."""
+    measured: float | None
+    """That number alone, in the unit of the reason (a share for per cent); None: nothing was measured."""
+
+    def __str__(self) -> str:
+        """Return the line of a scene file that sets the value, with the reason as its comment.
+
+        >>> str(Decision("maps.size", None, 256, False, "set in the scene", None))
+        'maps.size = 256  # set in the scene'
+        >>> str(Decision("layers.local", "lid", True, True, "it reflects itself", 0.1))
+        'layers.local = true  # lid: it reflects itself'
+        """
+        part = f"{self.part}: " if self.part is not None else ""
+        # Booleans, integers and plain strings are the same in JSON and TOML.
+        return f"{self.key} = {json.dumps(self.value)}  # {part}{self.reason}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All decisions of a bake, and the geometry that they lead to."""
+
+    decisions: tuple[Decision, ...]
+    distant: dict[str, Any]
+    """Proxy of the distant layer, as in a PEM's attributes."""
+
+    def value(self, key: str, part: str | None = None) -> bool | int | str:
+        """Return what was decided; KeyError for what was not."""
+        for decision in self.decisions:
+            if decision.key == key and decision.part in (None, part):
+                return decision.value
+        raise KeyError(key)
+
+    @property
+    def depth(self) -> int:
+        """Specular bounces after the first."""
+        return cast("int", self.value("trace.depth"))
+
+    @property
+    def samples(self) -> int:
+        """Rays per pixel."""
+        return cast("int", self.value("trace.samples"))
+
+    @property
+    def map_size(self) -> int:
+        """Texels along a side of a cube face."""
+        return cast("int", self.value("maps.size"))
+
+    @property
+    def has_diffuse(self) -> bool:
+        """Whether there is a diffuse layer."""
+        return bool(self.value("layers.diffuse"))
+
+    def has_local(self, part: str) -> bool:
+        """Whether a part of the reflector gets a local layer."""
+        return bool(self.value("layers.local", part))
+
+    def lines(self) -> list[str]:
+        """Return the decisions in words, one a line."""
+        return [str(decision) for decision in self.decisions]
+
+    def resolve(self, config: SceneConfig) -> SceneConfig:
+        """Return the scene with what the tracing of its views needs in place of "auto"."""
+        trace = config.trace.model_copy(update={"samples": self.samples, "depth": self.depth})
+        return config.model_copy(update={"trace": trace})
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values."""
+        return {"decisions": [asdict(decision) for decision in self.decisions], "distant": self.distant}
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> Plan:
+        """Inverse of `to_json`. Raises KeyError or TypeError for what is not one."""
+        plan = Plan(tuple(Decision(**decision) for decision in data["decisions"]), data["distant"])
+        for key in DECIDED_KEYS:
+            if all(decision.key != key for decision in plan.decisions):
+                raise KeyError(key)
+        return plan

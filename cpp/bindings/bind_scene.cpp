@@ -306,6 +306,17 @@ void bind_loaded_scene(nb::module_& m) {
       "`luminous_efficacy` (lumens per watt). Raises FileError if a file is missing, corrupt, beyond a limit "
       "or\n"
       "refers to files outside its directory.");
+  nb::enum_<FileContent>(m, "FileContent", "Which of the two functions reads a file.")
+      .value("mesh", FileContent::mesh, "load_mesh")
+      .value("scene", FileContent::scene, "load_scene");
+  m.def(
+      "referenced_files", &referenced_files, nb::arg("path"), nb::arg("content"),
+      nb::call_guard<nb::gil_scoped_release>(),
+      "The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF file "
+      "and,\n"
+      "for a scene, its images, or the material libraries of an OBJ file and their images. Absolute, each "
+      "once,\n"
+      "not those that do not exist. Raises FileError if `path` or a library is missing or corrupt.");
 }
 
 }  // namespace

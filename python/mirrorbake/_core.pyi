@@ -757,6 +757,22 @@ def load_scene(path: str, *, max_texture_side: int = 16384, max_texture_bytes: i
     refers to files outside its directory.
     """
 
+class FileContent(enum.Enum):
+    """Which of the two functions reads a file."""
+
+    mesh = 0
+    """load_mesh"""
+
+    scene = 1
+    """load_scene"""
+
+def referenced_files(path: str, content: FileContent) -> list[str]:
+    """
+    The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF file and,
+    for a scene, its images, or the material libraries of an OBJ file and their images. Absolute, each once,
+    not those that do not exist. Raises FileError if `path` or a library is missing or corrupt.
+    """
+
 def make_room() -> Scene:
     """
     The built-in furnished room. The table's top is the plane y = 0 with its centre at the origin; the reflector,

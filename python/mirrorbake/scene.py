@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from mirrorbake.config import MaterialConfig, Reflector, SceneConfig, Surroundings, Views
     from mirrorbake.metrics import FloatArray
     from mirrorbake.plan import Plan
+    from mirrorbake.store import Inputs
 
 DEFAULT_ELEVATION_DEGREES = 20.0
 FRAME_FILL = 0.9
@@ -74,19 +75,36 @@ class BuiltScene:
     """What the user should know about the inputs, such as values that had to be changed."""
 
 
-def hash_inputs(config: SceneConfig) -> dict[str, dict[str, str]]:
-    """Files that a scene uses, as {key: {path, sha256}}.
+_CONTENT = {
+    "reflector.mesh": _core.FileContent.mesh,
+    "surroundings.scene": _core.FileContent.scene,
+}
+"""Inputs that refer to further files."""
+
+
+def hash_inputs(config: SceneConfig) -> Inputs:
+    """Files that a scene uses, with those that they refer to: buffers, textures, material libraries.
 
     Raises
     ------
     InputError
         One cannot be read; the message names it.
+    mirrorbake.FileError
+        A mesh or a scene is corrupt, so that what it refers to is not known.
     """
-    inputs = {}
+    inputs: Inputs = {}
     for section, key in PATH_KEYS:
         path = getattr(getattr(config, section), key, None)
-        if path is not None:
-            inputs[f"{section}.{key}"] = {"path": path, "sha256": sha256_of(Path(path))}
+        if path is None:
+            continue
+        name = f"{section}.{key}"
+        inputs[name] = {"path": path, "sha256": sha256_of(Path(path))}
+        if name in _CONTENT:
+            folder = Path(path).resolve().parent
+            files = [Path(file) for file in _core.referenced_files(path, _CONTENT[name])]
+            inputs[name]["files"] = {
+                file.relative_to(folder).as_posix(): sha256_of(file) for file in sorted(files)
+            }
     return inputs
 
 

@@ -32,7 +32,7 @@ import json
 import os
 import shutil
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
 
 import numpy as np
 import zarr
@@ -143,6 +143,10 @@ def join_pyramid(finest: NDArray[Any], residuals: NDArray[Any]) -> FloatArray:
     return pyramid
 
 
+Inputs: TypeAlias = dict[str, dict[str, Any]]
+"""Files of a scene: key → {path, sha256, files}; `files`, if it refers to any, are {name: sha256}."""
+
+
 @dataclass(frozen=True)
 class Source:
     """What a PEM is made from."""
@@ -151,8 +155,8 @@ class Source:
     """Version of mirrorbake that writes it."""
     config: dict[str, Any]
     """The scene file with its defaults filled in and absolute paths."""
-    inputs: dict[str, dict[str, str]]
-    """Files that the scene uses: key → {path, sha256}."""
+    inputs: Inputs
+    """Files that the scene uses."""
 
     @property
     def fingerprint(self) -> str:
@@ -164,7 +168,7 @@ class Source:
         content: dict[str, Any] = json.loads(json.dumps(self.config))
         for key, source in self.inputs.items():
             section, name = key.split(".")
-            content[section][name] = source["sha256"]
+            content[section][name] = {"sha256": source["sha256"], "files": source.get("files", {})}
         return content
 
     def difference_from(self, other: Source) -> str:
@@ -179,11 +183,22 @@ class Source:
                 if theirs != value:
                     name = f"{section}.{key}"
                     if name in self.inputs and name in other.inputs:
-                        return f"{name}: a file of other content"
+                        assert theirs is not None
+                        return f"{name}: {_changed_file(value, theirs)}"
                     return f"{name} = {theirs!r} instead of {value!r}"
             if table is None and others[section] is not None:
                 return f"a section [{section}] instead of none"
         return "nothing"
+
+
+def _changed_file(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> str:
+    if mine["sha256"] != theirs["sha256"]:
+        return "a file of other content"
+    a, b = mine["files"], theirs["files"]
+    name = min(name for name in {**a, **b} if a.get(name) != b.get(name))
+    if name not in a:
+        return f"its file {name} is missing"
+    return f"its file {name} " + ("has another content" if name in b else "was not there")
 
 
 @dataclass(frozen=True)

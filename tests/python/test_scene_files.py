@@ -13,7 +13,7 @@ import mirrorbake
 from mirrorbake import _core
 from mirrorbake.bake import bake
 from mirrorbake.config import parse_config
-from mirrorbake.errors import InputError
+from mirrorbake.errors import InputError, StoreError
 from mirrorbake.evaluate import evaluate
 from mirrorbake.scene import build_scene, hash_inputs
 from mirrorbake.store import Source
@@ -257,6 +257,70 @@ def test_a_bake_with_another_material_is_another_scene(tmp_path: Path) -> None:
     assert own.difference_from(files).startswith("material.")
     # What a PEM keeps of its scene can be read again.
     assert parse_config(files.config, "again").material is None
+
+
+def test_files_that_a_scene_refers_to_are_part_of_it(tmp_path: Path) -> None:
+    def write(mtl: str = "newmtl a\nKs 0.9 0.9 0.9\nnewmtl b\nmap_Kd tiles.png\n", texel: int = 100) -> None:
+        (tmp_path / "paint.mtl").write_text(mtl)
+        (tmp_path / "tiles.png").write_bytes(png(np.full((2, 2, 3), texel, np.uint8)))
+
+    floor = "".join(f"v {x} {y} {z}\n" for x, y, z in SQUARE)
+    triangles = "o ball\nusemtl a\nf 5 6 7\nf 7 6 5\no floor\nusemtl b\nf 1 2 3\nf 1 3 4\n"
+    (tmp_path / "room.obj").write_text(
+        "mtllib paint.mtl\n" + floor + "v 0 0.2 0\nv 0.2 0.2 0\nv 0 0.5 0\n" + triangles
+    )
+    write()
+    data = {
+        "reflector": {"scene_object": "ball"},
+        "surroundings": {"scene": str(tmp_path / "room.obj")},
+        "views": {"count": 1, "size": [16, 16]},
+        "maps": {"size": 8},
+        "trace": {"indirect": "none", "samples": 1},
+    }
+    config = parse_config(data, "scene")
+    files = hash_inputs(config)["surroundings.scene"]["files"]
+    assert list(files) == ["paint.mtl", "tiles.png"]
+    bake(config, tmp_path / "pem")
+    assert bake(config, tmp_path / "pem").resumed == 1
+    write(texel=101)
+    with pytest.raises(StoreError, match=r"surroundings\.scene: its file tiles\.png has another content"):
+        bake(config, tmp_path / "pem")
+    with pytest.raises(StoreError, match=r"its file tiles\.png has another content"):
+        evaluate(tmp_path / "pem")
+    write()
+    assert bake(config, tmp_path / "pem").resumed == 1
+    write(mtl="newmtl a\nKs 0.8 0.8 0.8\nnewmtl b\n")
+    with pytest.raises(StoreError, match=r"its file paint\.mtl has another content"):
+        bake(config, tmp_path / "pem")
+    (tmp_path / "paint.mtl").unlink()
+    with pytest.raises(StoreError, match=r"its file paint\.mtl is missing"):
+        bake(config, tmp_path / "pem")
+
+
+def test_buffers_of_a_gltf_mesh_are_part_of_the_scene(tmp_path: Path) -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"uri": "corners.bin", "byteLength": 36}],
+    }
+    (tmp_path / "mesh.gltf").write_text(json.dumps(document))
+    config = parse_config({"reflector": {"mesh": str(tmp_path / "mesh.gltf")}}, "scene")
+
+    def source(scale: float) -> Source:
+        (tmp_path / "corners.bin").write_bytes((scale * corners).tobytes())
+        return Source("1", json.loads(config.model_dump_json()), hash_inputs(config))
+
+    once = source(1.0)
+    assert source(1.0).fingerprint == once.fingerprint
+    other = source(2.0)
+    assert other.fingerprint != once.fingerprint
+    assert other.difference_from(once) == "reflector.mesh: its file corners.bin has another content"
 
 
 def test_a_reflector_of_its_own_stands_in_a_scene_from_a_file(tmp_path: Path) -> None:

@@ -18,6 +18,9 @@ namespace mirrorbake::gltf {
 /// extensions that the file requires but this reader does not know.
 tinygltf::Model read_document(const std::string& path);
 
+/// The name of a file that a URI of the document means: "%20" is a space, and so on.
+std::string percent_decoded(const std::string& uri);
+
 /// Whether the name is that of an extension that this reader applies.
 bool is_known_extension(std::string_view name);
 

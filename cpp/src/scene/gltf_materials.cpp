@@ -16,25 +16,6 @@ namespace {
 // A lobe as narrow as this α is a mirror: most of it lies within 0.1°.
 constexpr float kMirrorAlpha = 1e-3F;
 
-std::string percent_decoded(const std::string& uri) {
-  const auto digit = [](char c) {
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-  };
-  std::string decoded;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0) {
-      decoded += static_cast<char>(16 * digit(uri[i + 1]) + digit(uri[i + 2]));
-      i += 2;
-    } else {
-      decoded += uri[i];
-    }
-  }
-  return decoded;
-}
-
 TextureWrap wrap_of(const std::string& path, int mode) {
   switch (mode) {
     case TINYGLTF_TEXTURE_WRAP_REPEAT: return TextureWrap::repeat;

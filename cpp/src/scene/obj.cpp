@@ -8,6 +8,7 @@
 #include <streambuf>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "loaded_mesh.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mtl.hpp"
+#include "obj_libraries.hpp"
 #include "polygon.hpp"
 
 namespace mirrorbake {
@@ -88,18 +90,6 @@ void check_tokens(const std::string& path, std::string_view text) {
                                 " or more");
     }
   }
-}
-
-// tinyobjloader would cut the names of files at spaces.
-std::vector<std::string> material_libraries(std::string_view text) {
-  std::vector<std::string> libraries;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
-    const auto [keyword, rest] = mtl::split_keyword(text.substr(0, end));
-    if (keyword == "mtllib" && !rest.empty()) libraries.emplace_back(rest);
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return libraries;
 }
 
 /// Builds the mesh as tinyobjloader calls back, line by line.
@@ -236,6 +226,32 @@ tinyobj::callback_t callbacks() {
 }
 
 }  // namespace
+
+// tinyobjloader would cut the names of files at spaces.
+std::vector<std::string> material_libraries(std::string_view text) {
+  std::vector<std::string> libraries;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+    const auto [keyword, rest] = mtl::split_keyword(text.substr(0, end));
+    if (keyword == "mtllib" && !rest.empty()) libraries.emplace_back(rest);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return libraries;
+}
+
+std::vector<std::string> library_files(const std::string& path, const std::string& names) {
+  std::error_code code;
+  const auto whole = resolve_inside(std::filesystem::path(path).parent_path(), names);
+  if (whole && std::filesystem::exists(*whole, code)) return {names};
+  std::vector<std::string> files;
+  std::string_view left = names;
+  while (!left.empty()) {
+    const auto [file, rest] = mtl::split_keyword(left);
+    files.emplace_back(file);
+    left = rest;
+  }
+  return files;
+}
 
 LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjMaterials* materials) {
   std::string text = read_file(path);

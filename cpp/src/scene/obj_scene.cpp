@@ -11,6 +11,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "mtl.hpp"
+#include "obj_libraries.hpp"
 #include "scene_builder.hpp"
 
 namespace mirrorbake {
@@ -63,20 +64,8 @@ class ObjScene {
   }
 
   void read_library(const std::string& names) {
-    // One file whose name has spaces, or several files.
-    std::vector<std::string> files{names};
     std::error_code code;
-    if (const auto whole = resolve_inside(fs::path(path_).parent_path(), names);
-        !whole || !fs::exists(*whole, code)) {
-      files.clear();
-      std::string_view left = names;
-      while (!left.empty()) {
-        const auto [file, rest] = mtl::split_keyword(left);
-        files.emplace_back(file);
-        left = rest;
-      }
-    }
-    for (const std::string& file : files) {
+    for (const std::string& file : library_files(path_, names)) {
       const fs::path library = resolved(path_, file);
       if (!fs::exists(library, code)) {
         warnings_.add("the material library '" + file + "' does not exist");

@@ -67,4 +67,12 @@ struct LoadedScene {
 /// of range.
 LoadedScene load_scene(const std::string& path, const SceneOptions& options = {});
 
+/// Which of the two functions reads a file.
+enum class FileContent { mesh, scene };
+
+/// The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF file and, for a scene,
+/// its images, or the material libraries of an OBJ file and their images. Absolute, each once, in the order of the
+/// references; not those that do not exist. Throws FileError if `path` or a library is missing or corrupt.
+std::vector<std::string> referenced_files(const std::string& path, FileContent content);
+
 }  // namespace mirrorbake

@@ -20,6 +20,12 @@ std::span<const float> flat(const std::optional<Matrix>& values) {
   return values ? flat(*values) : std::span<const float>{};
 }
 
+// The array has to outlive the selection.
+SampleSelection select(int part, const std::optional<ByteArray>& triangles) {
+  if (!triangles) return {part};
+  return {part, {triangles->data(), triangles->size()}};
+}
+
 }  // namespace
 
 void bind_inference(nb::module_& m) {
@@ -101,17 +107,20 @@ void bind_inference(nb::module_& m) {
           "uint32 (rows,): how many samples of the pixel see the part.")
       .def(
           "average",
-          [](const RenderingMatrix& self, const SurfaceSamples& samples, int part, Matrix values) {
+          [](const RenderingMatrix& self, const SurfaceSamples& samples, int part, Matrix values,
+             const std::optional<ByteArray>& triangles) {
+            const SampleSelection selection = select(part, triangles);
             std::vector<float> target;
             {
               const nb::gil_scoped_release unlocked;
-              target =
-                  average_over_rows(self, samples, part, flat(values), static_cast<int>(values.shape(1)));
+              target = average_over_rows(self, samples, selection, flat(values),
+                                         static_cast<int>(values.shape(1)));
             }
             return to_numpy(std::move(target), {self.rows(), values.shape(1)});
           },
-          nb::arg("samples"), nb::arg("part"), nb::arg("values"),
-          "Mean of per-sample values, float32 (len(samples), C), over each row's samples: float32 (rows, C).")
+          nb::arg("samples"), nb::arg("part"), nb::arg("values"), nb::arg("triangles") = nb::none(),
+          "Mean of per-sample values, float32 (len(samples), C), over each row's samples: float32 (rows, C). "
+          "`part` and\n`triangles` are those that the matrix was built of.")
       .def(
           "multiply",
           [](const RenderingMatrix& self, Matrix x) {
@@ -124,10 +133,19 @@ void bind_inference(nb::module_& m) {
           },
           nb::arg("x"), "b = A x for x float32 (columns, C): float32 (rows, C).");
 
-  m.def("build_rendering_matrix", &build_rendering_matrix, nb::arg("samples"), nb::arg("part"),
-        nb::arg("proxy"), nb::arg("layout"), nb::arg("options") = LookupOptions{},
-        nb::call_guard<nb::gil_scoped_release>(),
-        "Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups.");
+  m.def(
+      "build_rendering_matrix",
+      [](const SurfaceSamples& samples, int part, const Proxy& proxy, const CubePyramidLayout& layout,
+         const LookupOptions& options, const std::optional<ByteArray>& triangles) {
+        const SampleSelection selection = select(part, triangles);
+        const nb::gil_scoped_release unlocked;
+        return build_rendering_matrix(samples, selection, proxy, layout, options);
+      },
+      nb::arg("samples"), nb::arg("part"), nb::arg("proxy"), nb::arg("layout"),
+      nb::arg("options") = LookupOptions{}, nb::arg("triangles") = nb::none(),
+      "Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups. "
+      "`triangles`: uint8,\n0 for each triangle of the reflector whose samples are left out; None: all "
+      "count.");
 
   m.def(
       "display_row_weights",

@@ -13,6 +13,7 @@ namespace {
 struct OwnedPartMaps {
   Proxy local_proxy;
   std::optional<FloatMatrix> local;
+  std::optional<ByteArray> local_triangles;
   Proxy distant_proxy;
   FloatMatrix distant;
 };
@@ -24,14 +25,16 @@ void bind_pem(nb::module_& m) {
       .def(
           "__init__",
           [](OwnedPartMaps* self, const Proxy& distant_proxy, FloatMatrix distant, const Proxy& local_proxy,
-             std::optional<FloatMatrix> local) {
-            new (self) OwnedPartMaps{local_proxy, std::move(local), distant_proxy, std::move(distant)};
+             std::optional<FloatMatrix> local, std::optional<ByteArray> local_triangles) {
+            new (self) OwnedPartMaps{local_proxy, std::move(local), std::move(local_triangles), distant_proxy,
+                                     std::move(distant)};
           },
           nb::arg("distant_proxy"), nb::arg("distant"), nb::arg("local_proxy") = Proxy{},
-          nb::arg("local") = nb::none(),
+          nb::arg("local") = nb::none(), nb::arg("local_triangles") = nb::none(),
           "distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part "
-          "without "
-          "a local layer.");
+          "without\na local layer. local_triangles: uint8, 0 for each triangle of the reflector that the "
+          "local "
+          "layer leaves out,\nor None if it covers all.");
 
   m.def(
       "render_reflector",
@@ -44,6 +47,9 @@ void bind_pem(nb::module_& m) {
           view.distant_proxy = part->distant_proxy;
           view.distant = {part->distant.data(), part->distant.size()};
           if (part->local) view.local = {part->local->data(), part->local->size()};
+          if (part->local_triangles) {
+            view.local_triangles = {part->local_triangles->data(), part->local_triangles->size()};
+          }
           views.push_back(view);
         }
         std::span<const glm::vec3> diffuse_view;

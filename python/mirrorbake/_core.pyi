@@ -1358,17 +1358,19 @@ class RenderingMatrix:
     def row_samples(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
         """uint32 (rows,): how many samples of the pixel see the part."""
 
-    def average(self, samples: SurfaceSamples, part: int, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+    def average(self, samples: SurfaceSamples, part: int, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> NDArray[numpy.float32]:
         """
-        Mean of per-sample values, float32 (len(samples), C), over each row's samples: float32 (rows, C).
+        Mean of per-sample values, float32 (len(samples), C), over each row's samples: float32 (rows, C). `part` and
+        `triangles` are those that the matrix was built of.
         """
 
     def multiply(self, x: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """b = A x for x float32 (columns, C): float32 (rows, C)."""
 
-def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, layout: CubePyramidLayout, options: LookupOptions = ...) -> RenderingMatrix:
+def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, layout: CubePyramidLayout, options: LookupOptions = ..., triangles: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> RenderingMatrix:
     """
-    Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups.
+    Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups. `triangles`: uint8,
+    0 for each triangle of the reflector whose samples are left out; None: all count.
     """
 
 def display_row_weights(matrix: RenderingMatrix, samples_per_pixel: int, target: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
@@ -1457,9 +1459,11 @@ class MapSolver:
 class PartMaps:
     """Environment maps of one part of the reflector."""
 
-    def __init__(self, distant_proxy: Proxy, distant: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], local_proxy: Proxy = ..., local: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)] | None = None) -> None:
+    def __init__(self, distant_proxy: Proxy, distant: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], local_proxy: Proxy = ..., local: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)] | None = None, local_triangles: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None:
         """
-        distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part without a local layer.
+        distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part without
+        a local layer. local_triangles: uint8, 0 for each triangle of the reflector that the local layer leaves out,
+        or None if it covers all.
         """
 
 def render_reflector(samples: SurfaceSamples, parts: Sequence[PartMaps], layout: CubePyramidLayout, diffuse: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, options: LookupOptions = ...) -> NDArray[numpy.float32]:

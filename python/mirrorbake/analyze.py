@@ -71,11 +71,14 @@ def analyze(stage: Stage) -> Plan:
     if depth.automatic and depth.value != MAX_DEPTH:
         probe = _Probe.of(stage, int(depth.value))
     distant, proxy = _distant(stage, probe)
+    on_hull = hull_triangles(stage.built.positions, stage.built.triangles)[probe.triangle]
+    local = _local(stage, probe, on_hull)
     decisions = [
         depth,
         _samples(stage, int(depth.value)),
         _diffuse(stage, probe),
-        *_local(stage, probe),
+        *local,
+        _hull_split(stage, on_hull, any_local=any(decision.value for decision in local)),
         distant,
         _map_size(stage, proxy),
     ]
@@ -237,16 +240,15 @@ def _diffuse(stage: Stage, probe: _Probe) -> Decision:
     return Decision("layers.diffuse", None, change > config.auto.tolerance, True, reason, change)
 
 
-def _local(stage: Stage, probe: _Probe) -> list[Decision]:
+def _local(stage: Stage, probe: _Probe, on_hull: NDArray[np.bool_]) -> list[Decision]:
     config, built = stage.config, stage.built
     if config.layers.local is not None:
         return [Decision("layers.local", None, config.layers.local, False, _SET, None)]
-    on_hull = hull_triangles(built.positions, built.triangles)
     without = probe.diffuse + probe.fresnel * probe.distant
     decisions = []
     for number, name in enumerate(built.part_names):
         chosen = probe.part == number
-        inside = ~on_hull[probe.triangle[chosen]]
+        inside = ~on_hull[chosen]
         if not chosen.any():
             value, change, reason = False, 0.0, "no view sees it"
         elif not inside.any():
@@ -261,6 +263,17 @@ def _local(stage: Stage, probe: _Probe) -> list[Decision]:
             )
         decisions.append(Decision("layers.local", name, value, True, reason, change))
     return decisions
+
+
+def _hull_split(stage: Stage, on_hull: NDArray[np.bool_], *, any_local: bool) -> Decision:
+    wanted = stage.config.layers.hull_split
+    if wanted is not None:
+        return Decision("layers.hull_split", None, wanted, False, _SET, None)
+    if not any_local:
+        return Decision("layers.hull_split", None, False, True, "there is no local layer", None)
+    share = float(np.mean(on_hull))
+    reason = f"{share:.0%} of what the views see lies on the convex hull and cannot reflect the object"
+    return Decision("layers.hull_split", None, share > 0.0, True, reason, share)
 
 
 def _distant(stage: Stage, probe: _Probe) -> tuple[Decision, _core.Proxy]:

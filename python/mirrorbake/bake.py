@@ -13,6 +13,7 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.analyze import analyze
 from mirrorbake.errors import StoreError
+from mirrorbake.proxy import hull_triangles
 from mirrorbake.run_time import images_of_trace, proxy_from_attributes, proxy_to_attributes
 from mirrorbake.scene import hash_inputs, prepare_stage
 from mirrorbake.store import GROUP_NAME, Header, PemStore, Source, Timings, exclusive
@@ -155,7 +156,10 @@ def _create_store(stage: Stage, plan: Plan, source: Source, directory: Path) -> 
         precision=config.maps.precision,
         image_size=config.views.size,
     )
-    return PemStore.create(directory, header, capture, irradiance)
+    local_triangles = None
+    if plan.has_hull_split:
+        local_triangles = (~hull_triangles(built.positions, built.triangles)).astype(np.uint8)
+    return PemStore.create(directory, header, capture, irradiance, local_triangles)
 
 
 DIFFUSE_RAYS = 1024
@@ -175,6 +179,7 @@ class _ViewBaker:
         self._config = config
         self._store = store
         self._capture = capture
+        self._local_triangles = store.read_local_triangles()
         self._layout = _core.CubePyramidLayout(store.header.map_size)
         self._lookup = _core.LookupOptions(footprint_scale=config.infer.footprint_scale)
         self._solve = _core.SolveOptions(
@@ -195,11 +200,17 @@ class _ViewBaker:
         for number, part in enumerate(self._store.header.parts):
             for layer, description in part["layers"].items():
                 start = time.perf_counter()
+                triangles = self._local_triangles if layer == "local" else None
                 matrix = _core.build_rendering_matrix(
-                    trace.samples, number, proxy_from_attributes(description), self._layout, self._lookup
+                    trace.samples,
+                    number,
+                    proxy_from_attributes(description),
+                    self._layout,
+                    self._lookup,
+                    triangles,
                 )
                 values = self._values(trace.samples, layer, "local" in part["layers"])
-                target = matrix.average(trace.samples, number, values)
+                target = matrix.average(trace.samples, number, values, triangles)
                 middle = time.perf_counter()
                 initial = self._initial(part["name"], layer, index)
                 maps[part["name"], layer] = self._infer(matrix, target, layer, initial)

@@ -254,6 +254,9 @@ class Layers(_Section):
     local: Annotated[bool | None, *_AUTO] = None
     """Maps of the object's reflection in itself. "auto": for the parts whose picture it changes; without it
     a single map per part holds everything."""
+    hull_split: Annotated[bool | None, *_AUTO] = None
+    """Keeps polygons on the convex hull, which cannot reflect the object, out of the local maps ([PEM] §4).
+    "auto": if a view sees any."""
 
 
 DistantShape: TypeAlias = Literal[

@@ -16,6 +16,7 @@ DECIDED_KEYS = (
     "trace.samples",
     "layers.diffuse",
     "layers.local",
+    "layers.hull_split",
     "maps.distant",
     "maps.size",
 )
@@ -93,6 +94,11 @@ class Plan:
     def lines(self) -> list[str]:
         """Return the decisions in words, one a line."""
         return [str(decision) for decision in self.decisions]
+
+    @property
+    def has_hull_split(self) -> bool:
+        """Whether local maps leave out the polygons on the convex hull."""
+        return bool(self.value("layers.hull_split"))
 
     def resolve(self, config: SceneConfig) -> SceneConfig:
         """Return the scene with what the tracing of its views needs in place of "auto"."""

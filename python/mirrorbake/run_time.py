@@ -98,6 +98,7 @@ class RunTime:
             footprint_scale=self._header.source.config["infer"]["footprint_scale"]
         )
         self._irradiance = self.store.read_irradiance()
+        self._local_triangles = self.store.read_local_triangles()
         self._static = _core.build_cube_pyramid(self.store.read_capture())
         self._views: dict[int, dict[tuple[str, str], FloatArray]] = {}
 
@@ -165,7 +166,9 @@ class RunTime:
             distant = proxy_from_attributes(part["layers"]["distant"])
             if "local" in maps:
                 local = proxy_from_attributes(part["layers"]["local"])
-                parts.append(_core.PartMaps(distant, maps["distant"], local, maps["local"]))
+                parts.append(
+                    _core.PartMaps(distant, maps["distant"], local, maps["local"], self._local_triangles)
+                )
             else:
                 parts.append(_core.PartMaps(distant, maps["distant"]))
         return parts

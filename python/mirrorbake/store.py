@@ -12,6 +12,7 @@ array                       shape             holds
 `reference/background`      (N, H, W, 3)      what the other samples see, times their fraction
 `static/capture`            (6, S, S, 3)      traced from the object's centre, the object removed
 `diffuse/irradiance`        (V, 3)            W m⁻² at the object's vertices, if it has a diffuse layer
+`local_triangles`           (T,)              0: on the convex hull, no local layer; if that is split off
 `timings`                   (N, 3)            seconds spent tracing, building matrices, solving
 `complete`                  (N,)              1: every chunk of this view is there. Written last
 =========================== ================= ======================================================
@@ -314,7 +315,11 @@ class PemStore:
 
     @staticmethod
     def create(
-        directory: Path, header: Header, capture: FloatArray, irradiance: FloatArray | None
+        directory: Path,
+        header: Header,
+        capture: FloatArray,
+        irradiance: FloatArray | None,
+        local_triangles: NDArray[np.uint8] | None = None,
     ) -> PemStore:
         """Make a PEM without views in an existing folder.
 
@@ -328,6 +333,8 @@ class PemStore:
             The static map's finest level, shape (6, S, S, 3).
         irradiance
             Diffuse layer, shape (V, 3), or None.
+        local_triangles
+            Shape (T,), 0 for triangles of the reflector that the local layers leave out, or None.
 
         Raises
         ------
@@ -343,6 +350,8 @@ class PemStore:
             _put(group, "static/capture", capture, ("face", "row", "column", "channel"))
             if irradiance is not None:
                 _put(group, "diffuse/irradiance", irradiance, ("vertex", "channel"))
+            if local_triangles is not None:
+                _put(group, "local_triangles", local_triangles, ("triangle",))
             partial.rename(directory / GROUP_NAME)
         except OSError as failure:
             raise StoreError(f"{directory}: cannot write: {failure.strerror or failure}") from None
@@ -496,6 +505,12 @@ class PemStore:
             return None
         return self._read("diffuse/irradiance").astype(np.float32)
 
+    def read_local_triangles(self) -> NDArray[np.uint8] | None:
+        """Shape (T,): 0 for triangles that the local layers leave out; None if they cover all."""
+        if "local_triangles" not in self._group:
+            return None
+        return self._read("local_triangles").astype(np.uint8)
+
     def remove_stray_files(self) -> None:
         """Remove what a killed write left behind."""
         for stray in (self.directory / GROUP_NAME).rglob("*.partial"):
@@ -558,14 +573,16 @@ def _create_arrays(group: zarr.Group, header: Header) -> None:
     create("complete", (), "uint8", ())
 
 
-def _put(group: zarr.Group, name: str, data: FloatArray, dimensions: tuple[str, ...]) -> None:
+def _put(
+    group: zarr.Group, name: str, data: FloatArray | NDArray[np.uint8], dimensions: tuple[str, ...]
+) -> None:
     array = group.create_array(
         name,
         shape=data.shape,
         chunks=data.shape,
-        dtype="float32",
+        dtype=data.dtype.name,
         fill_value=0,
-        compressors=_compressor("float32"),
+        compressors=_compressor(data.dtype.name),
         dimension_names=dimensions,
     )
     array[...] = data

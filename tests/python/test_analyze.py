@@ -166,12 +166,12 @@ def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
     stage = make_stage(
         tmp_path,
         CONVEX,
-        layers={"diffuse": True, "local": True},
+        layers={"diffuse": True, "local": True, "hull_split": False},
         maps={"size": 32, "distant": "infinite"},
         trace={"depth": 5},
     )
     plan = analyze(stage)
-    assert [decision.value for decision in plan.decisions] == [5, 4, True, True, "infinite", 32]
+    assert [decision.value for decision in plan.decisions] == [5, 4, True, True, False, "infinite", 32]
     assert all(not decision.automatic and decision.reason == SET for decision in plan.decisions)
     bake(stage.config, tmp_path / "pem", None, stage)
     pem = open_pem(tmp_path / "pem", stage)

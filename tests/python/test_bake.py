@@ -20,6 +20,7 @@ from mirrorbake.demo import demo_config
 from mirrorbake.errors import InputError
 from mirrorbake.evaluate import Evaluation, OpenedPem, ViewMetrics, evaluate, open_pem
 from mirrorbake.metrics import psnr
+from mirrorbake.proxy import hull_triangles
 from mirrorbake.report import metrics_table
 from mirrorbake.run_time import (
     CONTENDERS,
@@ -106,6 +107,33 @@ def test_the_ellipsoid_of_each_part_encloses_it(baked: Baked) -> None:
         assert 0.99 < farthest < 1.0 + 1e-4
 
 
+def test_polygons_on_the_convex_hull_have_no_local_layer(baked: Baked) -> None:
+    pem, built = baked.open(), baked.stage.built
+    off_hull = ~hull_triangles(built.positions, built.triangles)
+    stored = pem.store.read_local_triangles()
+    assert stored is not None
+    np.testing.assert_array_equal(stored.astype(bool), off_hull)
+    assert 0.1 < off_hull.mean() < 0.9
+    # Polygons of the hull are drawn from the distant map alone, whatever the local one holds.
+    samples = baked.stage.visibility(0.0)
+    drawn = pem.run_time.render("pem", 0.0, samples)
+    pixel, on_hull = np.asarray(samples.pixel), ~off_hull[np.asarray(samples.triangle)]
+    parts = [
+        _core.PartMaps(
+            proxy_from_attributes(part["layers"]["distant"]), pem.store.read_map(part["name"], "distant", 0)
+        )
+        for part in pem.store.header.parts
+    ]
+    layout = _core.CubePyramidLayout(pem.store.header.map_size)
+    image = _core.render_reflector(samples, parts, layout, None, _core.LookupOptions(footprint_scale=0.25))
+    alone = (image[..., :3] / np.maximum(image[..., 3:], 1e-9)).reshape(-1, 3)
+    seen = np.bincount(pixel, minlength=len(alone))
+    whole = (seen > 0) & (np.bincount(pixel, weights=on_hull, minlength=len(alone)) == seen)
+    assert whole.sum() > 500
+    np.testing.assert_array_equal(drawn.reshape(-1, 3)[whole], alone[whole])
+    assert np.abs(drawn.reshape(-1, 3) - alone).max() > 0.1
+
+
 def test_a_trace_is_the_object_over_its_background(baked: Baked) -> None:
     trace = baked.stage.trace(0.5)
     images = images_of_trace(trace)
@@ -123,6 +151,7 @@ def test_between_two_views_the_maps_are_blended_linearly(baked: Baked) -> None:
     samples = baked.stage.visibility(0.25)
     store = pem.store
     blended = pem.run_time.render("pem", 0.25, samples)
+    split = store.read_local_triangles()
     layout = _core.CubePyramidLayout(store.header.map_size)
     options = _core.LookupOptions(footprint_scale=0.25)
     # Compositing (L_local + (1 − α) L_distant) is not linear in α and L_distant together: maps are blended,
@@ -134,7 +163,9 @@ def test_between_two_views_the_maps_are_blended_linearly(baked: Baked) -> None:
             for layer in ("local", "distant")
         }
         proxies = {layer: proxy_from_attributes(part["layers"][layer]) for layer in maps}
-        parts.append(_core.PartMaps(proxies["distant"], maps["distant"], proxies["local"], maps["local"]))
+        parts.append(
+            _core.PartMaps(proxies["distant"], maps["distant"], proxies["local"], maps["local"], split)
+        )
     image = _core.render_reflector(samples, parts, layout, None, options)
     expected = image[..., :3] / np.maximum(image[..., 3:], 1e-9)
     np.testing.assert_allclose(blended, expected, rtol=1e-5, atol=1e-6)

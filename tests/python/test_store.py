@@ -37,7 +37,7 @@ HALF_ROUNDING = 2.0**-11
 def make_plan(samples: int = 4) -> Plan:
     values: dict[str, bool | int | str] = {
         "trace.depth": 2, "trace.samples": samples, "layers.diffuse": False,
-        "layers.local": True, "maps.distant": "infinite", "maps.size": SIZE,
+        "layers.local": True, "layers.hull_split": False, "maps.distant": "infinite", "maps.size": SIZE,
     }  # fmt: skip
     decisions = (Decision(key, None, value, True, "measured", 0.25) for key, value in values.items())
     return Plan(tuple(decisions), {"shape": "infinite", "origin": [0.0, 0.0, 0.0]})

@@ -18,11 +18,23 @@ struct RowSamples {
   std::vector<std::size_t> offsets;    // rows + 1, into members
 };
 
-RowSamples group_by_pixel(const SurfaceSamples& samples, int part) {
+RowSamples group_by_pixel(const SurfaceSamples& samples, const SampleSelection& selection) {
+  if (!selection.triangles.empty() && samples.triangle.size() != samples.size()) {
+    throw InvalidArgument("samples.triangle", std::to_string(samples.triangle.size()) + " entries",
+                          std::to_string(samples.size()) + ", as many as samples.pixel");
+  }
   RowSamples rows;
   rows.offsets.push_back(0);
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (samples.part[i] != part) continue;
+    if (samples.part[i] != selection.part) continue;
+    if (!selection.triangles.empty()) {
+      if (samples.triangle[i] >= selection.triangles.size()) {
+        throw InvalidArgument("triangles", std::to_string(selection.triangles.size()) + " entries",
+                              "one per triangle of the reflector, of which number " +
+                                  std::to_string(samples.triangle[i]) + " is seen");
+      }
+      if (selection.triangles[samples.triangle[i]] == 0) continue;
+    }
     if (!rows.members.empty() && samples.pixel[rows.members.back()] != samples.pixel[i]) {
       rows.offsets.push_back(rows.members.size());
     }
@@ -114,15 +126,16 @@ CubeFootprint lookup_footprint(const SurfaceSamples& samples, std::size_t i, con
   return trilinear_footprint(layout, direction, level);
 }
 
-RenderingMatrix build_rendering_matrix(const SurfaceSamples& samples, int part, const Proxy& proxy,
-                                       const CubePyramidLayout& layout, const LookupOptions& options) {
+RenderingMatrix build_rendering_matrix(const SurfaceSamples& samples, const SampleSelection& selection,
+                                       const Proxy& proxy, const CubePyramidLayout& layout,
+                                       const LookupOptions& options) {
   check_lengths(samples);
   validate(proxy);
   if (!(options.footprint_scale > 0.0F) || options.footprint_scale > 1024.0F) {
     throw InvalidArgument("footprint_scale", std::to_string(options.footprint_scale),
                           "a number in (0, 1024]");
   }
-  const RowSamples groups = group_by_pixel(samples, part);
+  const RowSamples groups = group_by_pixel(samples, selection);
   const std::size_t rows = groups.offsets.size() - 1;
 
   RenderingMatrix matrix;
@@ -171,18 +184,20 @@ RenderingMatrix build_rendering_matrix(const SurfaceSamples& samples, int part, 
   return matrix;
 }
 
-std::vector<float> average_over_rows(const RenderingMatrix& matrix, const SurfaceSamples& samples, int part,
-                                     std::span<const float> values, int channels) {
+std::vector<float> average_over_rows(const RenderingMatrix& matrix, const SurfaceSamples& samples,
+                                     const SampleSelection& selection, std::span<const float> values,
+                                     int channels) {
   const std::size_t c = static_cast<std::size_t>(channels);
   if (channels < 1 || values.size() != samples.size() * c) {
     throw InvalidArgument("values", std::to_string(values.size()) + " numbers",
                           "samples × channels = " + std::to_string(samples.size() * c));
   }
-  const RowSamples groups = group_by_pixel(samples, part);
+  const RowSamples groups = group_by_pixel(samples, selection);
   const std::size_t rows = groups.offsets.size() - 1;
   if (rows != matrix.rows()) {
     throw InvalidArgument("matrix", std::to_string(matrix.rows()) + " rows",
-                          std::to_string(rows) + ", one per pixel that sees part " + std::to_string(part));
+                          std::to_string(rows) + ", one per pixel that sees the selected samples of part " +
+                              std::to_string(selection.part));
   }
   std::vector<float> target(rows * c);
   parallel_for(rows, 4 * kRowsPerChunk, [&](std::size_t begin, std::size_t end) {

@@ -58,6 +58,18 @@ Image render_reflector(const SurfaceSamples& samples, std::span<const PartMaps> 
                             "at least " + std::to_string(last + 1) + ", one per part that is seen");
     }
   }
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const std::size_t known = parts[p].local_triangles.size();
+    if (known == 0) continue;
+    check_length("samples.triangle", samples.triangle.size(), samples.size());
+    const auto unknown = std::find_if(samples.triangle.begin(), samples.triangle.end(),
+                                      [known](std::uint32_t triangle) { return triangle >= known; });
+    if (unknown != samples.triangle.end()) {
+      throw InvalidArgument(
+          "parts[" + std::to_string(p) + "].local_triangles", std::to_string(known) + " entries",
+          "one per triangle of the reflector, of which number " + std::to_string(*unknown) + " is seen");
+    }
+  }
   if (!diffuse.empty()) check_length("diffuse", diffuse.size(), samples.size());
 
   // Where each pixel's samples start: pixels are independent of each other, samples are in their order.
@@ -72,7 +84,8 @@ Image render_reflector(const SurfaceSamples& samples, std::span<const PartMaps> 
       const PartMaps& maps = parts[samples.part[i]];
       glm::vec3 light =
           read_distant(maps.distant, lookup_footprint(samples, i, maps.distant_proxy, layout, options));
-      if (!maps.local.empty()) {
+      if (!maps.local.empty() &&
+          (maps.local_triangles.empty() || maps.local_triangles[samples.triangle[i]] != 0)) {
         const glm::vec4 local =
             read_local(maps.local, lookup_footprint(samples, i, maps.local_proxy, layout, options));
         light = glm::vec3(local) + (1.0F - local.a) * light;

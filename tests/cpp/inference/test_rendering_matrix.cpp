@@ -52,6 +52,34 @@ TEST(RenderingMatrix, AverageIsTheMeanOverTheRowsSamples) {
   }
 }
 
+TEST(RenderingMatrix, OfSomeTrianglesIsThatOfTheirSamplesAlone) {
+  SurfaceSamples samples = testing::mirror_sphere_samples(24, 4);
+  const CubePyramidLayout layout = CubePyramidLayout::full(16);
+  samples.triangle.resize(samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) samples.triangle[i] = static_cast<std::uint32_t>(i % 3);
+  const std::vector<std::uint8_t> chosen{1, 0, 1};
+  std::vector<float> values(samples.size());
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i % 3);
+  // The same by giving the samples of the other triangle to another part.
+  SurfaceSamples moved = samples;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (samples.triangle[i] == 1) moved.part[i] = 7;
+  }
+  const RenderingMatrix a = build_rendering_matrix(samples, {0, chosen}, kBox, layout);
+  const RenderingMatrix b = build_rendering_matrix(moved, 0, kBox, layout);
+  ASSERT_GT(a.rows(), 100u);
+  EXPECT_EQ(a.texels, b.texels);
+  EXPECT_EQ(a.weights, b.weights);
+  EXPECT_EQ(a.row_samples, b.row_samples);
+  EXPECT_EQ(average_over_rows(a, samples, {0, chosen}, values, 1), average_over_rows(b, moved, 0, values, 1));
+  EXPECT_LT(a.nonzeros(), build_rendering_matrix(samples, 0, kBox, layout).nonzeros());
+
+  const std::vector<std::uint8_t> too_few{1, 1};
+  EXPECT_THROW(build_rendering_matrix(samples, {0, too_few}, kBox, layout), InvalidArgument);
+  samples.triangle.clear();
+  EXPECT_THROW(build_rendering_matrix(samples, {0, chosen}, kBox, layout), InvalidArgument);
+}
+
 TEST(RenderingMatrix, SameBitsOnOneThread) {
   const SurfaceSamples samples = testing::mirror_sphere_samples(64, 4);
   const CubePyramidLayout layout = CubePyramidLayout::full(64);

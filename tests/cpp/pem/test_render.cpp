@@ -88,6 +88,37 @@ TEST(Render, CompositesLocalOverDistantTimesFresnelPlusDiffuse) {
   EXPECT_GT(covered, 300);
 }
 
+TEST(Render, TrianglesThatTheLocalLayerLeavesOutShowTheDistantOneAlone) {
+  SurfaceSamples samples = testing::mirror_sphere_samples(20, 1);
+  const CubePyramidLayout layout = CubePyramidLayout::full(4);
+  samples.triangle.resize(samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) samples.triangle[i] = static_cast<std::uint32_t>(i % 2);
+  const std::vector<float> local = testing::random_values(4 * layout.texels(), 1);
+  const std::vector<float> distant = testing::random_values(3 * layout.texels(), 2);
+  const std::vector<std::uint8_t> covered{0, 1};
+  const PartMaps with{kEllipsoid, local, kBox, distant};
+  const PartMaps without{{}, {}, kBox, distant};
+  const PartMaps split{kEllipsoid, local, kBox, distant, covered};
+  const auto draw = [&](const PartMaps& part) {
+    const PartMaps parts[2] = {part, part};
+    return render_reflector(samples, parts, layout, {});
+  };
+  const Image all = draw(with);
+  const Image none = draw(without);
+  const Image some = draw(split);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const Image& expected = samples.triangle[i] == 1 ? all : none;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t at = std::size_t{4} * samples.pixel[i] + k;
+      ASSERT_EQ(some.pixels[at], expected.pixels[at]);
+    }
+  }
+  EXPECT_NE(all.pixels, none.pixels);
+  const std::vector<std::uint8_t> too_few{1};
+  const PartMaps parts[2] = {split, {kEllipsoid, local, kBox, distant, too_few}};
+  EXPECT_THROW(render_reflector(samples, parts, layout, {}), InvalidArgument);
+}
+
 TEST(Render, SameBitsOnOneThread) {
   const SurfaceSamples samples = testing::mirror_sphere_samples(64, 4);
   const CubePyramidLayout layout = CubePyramidLayout::full(32);

@@ -22,6 +22,9 @@ struct PartMaps {
   std::span<const float> local;  ///< texels × 4, premultiplied RGBA; empty: the part has no local layer
   Proxy distant_proxy;
   std::span<const float> distant;  ///< texels × 3
+  /// One entry per triangle of the reflector: 0 for those that the local layer leaves out, since they lie on the convex hull
+  /// and cannot reflect the object ([PEM] §4, spec G5). Empty: it covers all.
+  std::span<const std::uint8_t> local_triangles = {};
 };
 
 /// Composites `(L_local + (1−α) L_distant) F + D` for every sample and averages over the pixel. `parts[p]` belongs to part p of

@@ -1,5 +1,7 @@
 """The automatic choice of geometry on traced scenes: a teapot in six different surroundings."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The ray tracer as Python sees it: shapes, ownership, options and errors. Its physics is tested in C++."""
 
+from __future__ import annotations
+
 import gc
 
 import numpy as np

@@ -38,13 +38,12 @@ class ProgressCounter {
 /// What the samples of a window's pixels add up to, so that more can be added.
 class BeautySums {
  public:
-  static constexpr int kTileSize = 16;
-
-  BeautySums(int image_width, PixelWindow window)
+  BeautySums(int image_width, PixelWindow window, int tile_size)
       : image_width_(image_width),
         window_(window),
-        tiles_across_((window.width + kTileSize - 1) / kTileSize),
-        tiles_down_((window.height + kTileSize - 1) / kTileSize),
+        tile_size_(tile_size),
+        tiles_across_((window.width + tile_size - 1) / tile_size),
+        tiles_down_((window.height + tile_size - 1) / tile_size),
         sum_(static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height),
              glm::dvec3(0.0)),
         squares_(sum_.size(), 0.0),
@@ -120,9 +119,9 @@ class BeautySums {
   PixelWindow tile_area(std::size_t tile) const {
     const int column = static_cast<int>(tile) % tiles_across_;
     const int row = static_cast<int>(tile) / tiles_across_;
-    return {window_.x + column * kTileSize, window_.y + row * kTileSize,
-            std::min(kTileSize, window_.width - column * kTileSize),
-            std::min(kTileSize, window_.height - row * kTileSize)};
+    return {window_.x + column * tile_size_, window_.y + row * tile_size_,
+            std::min(tile_size_, window_.width - column * tile_size_),
+            std::min(tile_size_, window_.height - row * tile_size_)};
   }
   std::size_t pixel(int x, int y) const {
     return static_cast<std::size_t>(y - window_.y) * static_cast<std::size_t>(window_.width) +
@@ -131,6 +130,7 @@ class BeautySums {
 
   int image_width_;
   PixelWindow window_;
+  int tile_size_;  ///< pixels; a tile is what one thread traces at a time
   int tiles_across_;
   int tiles_down_;
   std::vector<glm::dvec3> sum_;
@@ -142,7 +142,8 @@ class BeautySums {
 template <typename RayThrough>
 Image trace_image(const World& world, const RayScene::View& view, int image_width, const PixelWindow& window,
                   const TraceOptions& options, const RayThrough& ray_through) {
-  BeautySums sums(image_width, window);
+  // Small, so that the threads end together.
+  BeautySums sums(image_width, window, 8);
   ProgressCounter progress(options, sums.tile_count());
   parallel_for(sums.tile_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t tile = begin; tile < end; ++tile) {

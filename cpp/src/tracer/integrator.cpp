@@ -13,6 +13,7 @@ namespace mirrorbake::tracing {
 namespace {
 
 constexpr float kInversePi = std::numbers::inv_pi_v<float>;
+constexpr float kBelowOne = 0x1.fffffep-1F;
 
 // Shadow rays stop this fraction short of the light they aim at.
 constexpr float kShadowEpsilon = 1e-4F;
@@ -53,6 +54,36 @@ struct Partners {
   bool cosine = false;
   bool lobe = false;
 };
+
+// How a diffuse path goes on. Most samples follow the cosine; where caustics fall, some follow the guide.
+struct DiffuseBounce {
+  glm::vec3 direction{0.0F};  ///< unit
+  float weight = 0.0F;        ///< of what arrives from there, before the albedo; 0: below the surface
+  /// Density by the cosine alone: what next-event estimation shares with. The two need only agree on it.
+  float pdf = 0.0F;
+};
+
+DiffuseBounce diffuse_bounce(const World& world, const Surface& surface, glm::vec2 u) {
+  const CausticGuide::Cell cell = world.guide.cell(surface.position);
+  DiffuseBounce bounce;
+  if (cell.share == 0.0F) {
+    bounce.direction = sample_cosine_hemisphere(Frame(surface.normal), u);
+  } else if (u.x < cell.share) {
+    bounce.direction = world.guide.sample(cell, {u.x / cell.share, u.y});
+  } else {
+    u.x = std::min((u.x - cell.share) / (1.0F - cell.share), kBelowOne);
+    bounce.direction = sample_cosine_hemisphere(Frame(surface.normal), u);
+  }
+  const float cosine = glm::dot(surface.normal, bounce.direction);
+  if (!(cosine > 0.0F) || !(glm::dot(surface.geometric_normal, bounce.direction) > 0.0F)) return bounce;
+  bounce.pdf = cosine * kInversePi;
+  bounce.weight = 1.0F;
+  if (cell.share > 0.0F) {
+    const float guided = world.guide.pdf(cell, bounce.direction);
+    bounce.weight = bounce.pdf / (bounce.pdf + cell.share * (guided - bounce.pdf));
+  }
+  return bounce;
+}
 
 struct DirectLight {
   glm::vec3 irradiance{0.0F};
@@ -194,11 +225,15 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
   Surface surface = start;
   int diffuse_bounces = 1;
   int specular_bounces = 0;
-  glm::vec3 direction = sample_cosine_hemisphere(Frame(surface.normal),
-                                                 stream.get(dimension_base(bounce, 0) + diffuse_dimension));
-  float pdf = glm::dot(surface.normal, direction) * kInversePi;  // 0 after a mirror: emission counts in full
+  // What the surfaces reflect of the path so far, made up for by the roulette.
+  glm::vec3 reflected(1.0F);
+  const DiffuseBounce first =
+      diffuse_bounce(world, surface, stream.get(dimension_base(bounce, 0) + diffuse_dimension));
+  throughput *= first.weight;
+  glm::vec3 direction = first.direction;
+  float pdf = first.pdf;  // 0 after a mirror: emission counts in full
   for (int vertex = 1;; ++vertex) {
-    if (!(glm::dot(surface.geometric_normal, direction) > 0.0F)) return sum;
+    if (throughput == glm::vec3(0.0F) || !(glm::dot(surface.geometric_normal, direction) > 0.0F)) return sum;
     const Ray ray{offset_origin(surface, direction), direction};
     const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
     if (hit.missed() || world.is_light(hit)) return sum + throughput * emitted_light(world, ray, hit, pdf);
@@ -230,23 +265,31 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
     if (choice.x < specular_probability) {
       const SpecularBounce next =
           specular_bounce(surface, surface.rough() ? random(rough_dimension) : glm::vec2(0.0F));
-      throughput *= surface.fresnel * next.weight / specular_probability;
+      const glm::vec3 factor = surface.fresnel * next.weight / specular_probability;
+      throughput *= factor;
+      reflected *= factor;
       direction = next.direction;
       pdf = next.pdf;
       ++specular_bounces;
     } else {
-      throughput *= surface.albedo / (1.0F - specular_probability);
-      direction = sample_cosine_hemisphere(Frame(surface.normal), random(diffuse_dimension));
-      pdf = glm::dot(surface.normal, direction) * kInversePi;
+      const DiffuseBounce next = diffuse_bounce(world, surface, random(diffuse_dimension));
+      const glm::vec3 factor = surface.albedo / (1.0F - specular_probability);
+      throughput *= next.weight * factor;
+      reflected *= factor;
+      direction = next.direction;
+      pdf = next.pdf;
       ++diffuse_bounces;
     }
-    // Russian roulette from the third vertex on.
-    const float brightest = std::max(throughput.x, std::max(throughput.y, throughput.z));
+    // Russian roulette by what the surfaces reflect: the guide's weights are small just where much light is to be
+    // found. Paths are short-lived only once that is little: an early end saves less time than its noise costs.
+    constexpr float kReflectedLittle = 0.25F;
+    const float brightest = std::max(reflected.x, std::max(reflected.y, reflected.z));
     if (!(brightest > 0.0F)) return sum;
-    if (vertex >= 2) {
-      const float survival = std::min(0.95F, brightest);
+    if (vertex >= 2 && brightest < kReflectedLittle) {
+      const float survival = brightest / kReflectedLittle;
       if (!(choice.y < survival)) return sum;
       throughput /= survival;
+      reflected /= survival;
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "cdf.hpp"
 #include "sample_stream.hpp"
 #include "surface.hpp"
 
@@ -13,33 +14,6 @@ namespace mirrorbake::tracing {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-
-// Interval of a cumulative distribution that holds u, and u's place in that interval, in [0,1).
-struct CdfSample {
-  int index;
-  float place;
-};
-CdfSample sample_cdf(const float* cdf, int count, float u) {
-  const float* after = std::upper_bound(cdf + 1, cdf + count, u);
-  const int i = static_cast<int>(after - cdf) - 1;
-  const float width = cdf[i + 1] - cdf[i];
-  const float place = width > 0.0F ? (u - cdf[i]) / width : 0.5F;
-  return {i, std::clamp(place, 0.0F, std::nextafter(1.0F, 0.0F))};
-}
-
-// Sums up in double and scales to end at exactly 1. Returns the sum; the distribution is uniform if it is 0.
-double normalise_cdf(float* cdf, const double* values, int count) {
-  double sum = 0.0;
-  for (int i = 0; i < count; ++i) sum += values[i];
-  double running = 0.0;
-  cdf[0] = 0.0F;
-  for (int i = 0; i < count; ++i) {
-    running += sum > 0.0 ? values[i] / sum : 1.0 / count;
-    cdf[i + 1] = static_cast<float>(std::min(running, 1.0));
-  }
-  cdf[count] = 1.0F;
-  return sum;
-}
 
 // A rectangle seen from a point, in the rectangle's frame, with the constants of Ureña, Fajardo, King, An
 // Area-Preserving Parametrization for Spherical Rectangles, EGSR 2013. In double: the angles nearly cancel.

@@ -158,6 +158,7 @@ PixelWindow window_in(const TraceOptions& options, int width, int height) {
 Tracer::State::State(Scene scene, const TracerOptions& options)
     : world((validated(scene), std::move(scene)), validated(options)) {
   if (options.indirect == IndirectLight::cached) world.cache = tracing::IrradianceCache(world);
+  if (options.indirect == IndirectLight::path) world.guide = tracing::CausticGuide(world);
 }
 
 void Tracer::State::check_object(const char* argument, int object) const {
@@ -203,7 +204,8 @@ BeautyTrace Tracer::trace_beauty_to_noise(const Camera& camera, float noise,
   const tracing::CameraRays rays(camera);
   const glm::vec3 eye = camera.eye - world.rays.origin();
   const auto ray_through = [&](int, glm::vec2 point) { return Ray{eye, rays.direction(point)}; };
-  BeautySums sums(camera.width, tracing::window_in(options, camera.width, camera.height));
+  constexpr int kTileSize = 16;
+  BeautySums sums(camera.width, tracing::window_in(options, camera.width, camera.height), kTileSize);
 
   // Rounds over all tiles, so that which one ends depends neither on the number of threads nor on their order.
   std::vector<std::size_t> open(sums.tile_count());

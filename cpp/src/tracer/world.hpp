@@ -4,6 +4,7 @@
 #include <span>
 #include <glm/geometric.hpp>
 
+#include "caustic_guide.hpp"
 #include "irradiance_cache.hpp"
 #include "lights.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
@@ -24,6 +25,7 @@ struct World {
   RayScene rays;
   Lights lights;
   IrradianceCache cache;  ///< empty unless options.indirect is `cached`
+  CausticGuide guide;     ///< empty unless options.indirect is `path`
 
   bool is_light(const Hit& hit) const { return hit.geometry >= scene.objects.size(); }
   /// Number of a light's hit among the rectangle lights, then the sphere lights.

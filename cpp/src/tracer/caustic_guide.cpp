@@ -1,0 +1,276 @@
+#include "caustic_guide.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <span>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "cdf.hpp"
+#include "integrator.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "world.hpp"
+
+namespace mirrorbake::tracing {
+namespace {
+
+constexpr std::size_t kPhotons = 1U << 17;
+constexpr std::uint32_t kSpecularBounces = 4;
+
+// Cells along the grid's longest side.
+constexpr int kCells = 32;
+// Following the guide, a path finds caustics; otherwise all else. Half as many as the others at most.
+constexpr float kLargestShare = 0.35F;
+// Where caustics are this part of the light that falls on the reflectors, half the largest share follows.
+constexpr float kNoticeable = 0.01F;
+// Less than this is not worth the look.
+constexpr float kLeastShare = 0.05F;
+
+// The octahedral map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT
+// 3(2), 2014) to [−1,1]², and its solid angle per area, |d|₁³ for a unit direction d.
+struct Octahedral {
+  glm::vec2 point;
+  float solid_angle;
+};
+
+Octahedral octahedral(glm::vec3 d) {
+  const float sum = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
+  glm::vec2 p = glm::vec2(d.x, d.y) / sum;
+  if (d.z < 0.0F) {
+    p = glm::vec2(std::copysign(1.0F - std::abs(p.y), p.x), std::copysign(1.0F - std::abs(p.x), p.y));
+  }
+  return {p, sum * sum * sum};
+}
+
+glm::vec3 from_octahedral(glm::vec2 p) {
+  const float z = 1.0F - std::abs(p.x) - std::abs(p.y);
+  if (z < 0.0F)
+    p = glm::vec2(std::copysign(1.0F - std::abs(p.y), p.x), std::copysign(1.0F - std::abs(p.x), p.y));
+  return glm::normalize(glm::vec3(p, z));
+}
+
+constexpr int kSide = CausticGuide::kSide;
+constexpr int kBins = CausticGuide::kBins;
+constexpr float kBinArea = 4.0F / static_cast<float>(kBins);
+
+int bin_of(glm::vec2 point) {
+  const int x = std::min(static_cast<int>((point.x + 1.0F) * (0.5F * kSide)), kSide - 1);
+  const int y = std::min(static_cast<int>((point.y + 1.0F) * (0.5F * kSide)), kSide - 1);
+  return y * kSide + x;
+}
+
+}  // namespace
+
+// The specular surfaces as one distribution of triangles by area.
+class SpecularTriangles {
+ public:
+  explicit SpecularTriangles(const World& world) {
+    std::vector<double> areas;
+    for (std::uint32_t o = 0; o < world.scene.objects.size(); ++o) {
+      const Object& object = world.scene.objects[o];
+      const bool is_seen = (object.visibility & Visibility::reflection) != Visibility::none;
+      if (!is_seen || !world.scene.materials[static_cast<std::size_t>(object.material)].specular) continue;
+      const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(o));
+      for (std::uint32_t t = 0; t < object.mesh.triangles.size(); ++t) {
+        const glm::uvec3 c = object.mesh.triangles[t];
+        const glm::dvec3 a = p[c.x];
+        areas.push_back(0.5 * glm::length(glm::cross(glm::dvec3(p[c.y]) - a, glm::dvec3(p[c.z]) - a)));
+        triangles_.push_back({o, t});
+      }
+    }
+    if (triangles_.empty()) return;
+    cdf_.resize(areas.size() + 1);
+    area_ = normalise_cdf(cdf_.data(), areas.data(), static_cast<int>(areas.size()));
+  }
+
+  double area() const { return area_; }
+
+  /// A random point, as if a ray had hit it.
+  Hit sample(glm::vec2 u) const {
+    const CdfSample pick = sample_cdf(cdf_.data(), static_cast<int>(triangles_.size()), u.x);
+    const Triangle& t = triangles_[static_cast<std::size_t>(pick.index)];
+    const float root = std::sqrt(pick.place);
+    return {0.0F, t.object, t.triangle, root * (1.0F - u.y), root * u.y};
+  }
+
+ private:
+  struct Triangle {
+    std::uint32_t object;
+    std::uint32_t triangle;
+  };
+  std::vector<Triangle> triangles_;
+  std::vector<float> cdf_;
+  double area_ = 0.0;
+};
+
+namespace {
+
+glm::vec3 point_at(const World& world, const Hit& hit) {
+  const glm::uvec3 c = world.scene.objects[hit.geometry].mesh.triangles[hit.triangle];
+  const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(hit.geometry));
+  return (1.0F - hit.u - hit.v) * p[c.x] + hit.u * p[c.y] + hit.v * p[c.z];
+}
+
+}  // namespace
+
+void CausticGuide::shoot_one(const World& world, const Hit& start, float area, const SampleStream& stream,
+                             Photons& photons) {
+  const std::optional<LightSample> light = world.lights.sample(point_at(world, start), stream.get(1));
+  if (!light) return;
+  Surface surface = surface_at(world.scene, world.rays, start, -light->direction);
+  // A mirror's image of a point light is found by no ray.
+  if (light->pdf == 0.0F && !surface.rough()) return;
+  constexpr float kShadowEpsilon = 1e-3F;
+  if (world.rays.all().occluded({offset_origin(surface, light->direction), light->direction,
+                                 light->distance * (1.0F - kShadowEpsilon)})) {
+    return;
+  }
+  glm::vec3 power = area * glm::dot(surface.geometric_normal, light->direction) * light->radiance;
+  photons.received += static_cast<double>(luminance(power));
+  for (std::uint32_t bounce = 0; bounce < kSpecularBounces; ++bounce) {
+    const SpecularBounce next = specular_bounce(surface, stream.get(2 + bounce));
+    power *= surface.fresnel * next.weight;
+    if (!(luminance(power) > 0.0F)) return;
+    const Ray ray{offset_origin(surface, next.direction), next.direction};
+    const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
+    if (hit.missed() || world.is_light(hit)) return;
+    surface = surface_at(world.scene, world.rays, hit, ray.direction);
+    if (surface.albedo != glm::vec3(0.0F)) {
+      photons.landed.push_back({surface.position, surface.view, luminance(power)});
+    }
+    if (!surface.specular()) return;
+  }
+}
+
+CausticGuide::Photons CausticGuide::shoot(const World& world, const SpecularTriangles& specular) {
+  constexpr std::size_t kChunk = 4096;
+  const auto area = static_cast<float>(specular.area() / kPhotons);
+  std::vector<Photons> chunks((kPhotons + kChunk - 1) / kChunk);
+  parallel_for(kPhotons, kChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const SampleStream stream = sample_stream(world.options.seed, 0, static_cast<std::uint32_t>(i));
+      shoot_one(world, specular.sample(stream.get(0)), area, stream, chunks[begin / kChunk]);
+    }
+  });
+  Photons photons;
+  for (const Photons& chunk : chunks) {
+    photons.landed.insert(photons.landed.end(), chunk.landed.begin(), chunk.landed.end());
+    photons.received += chunk.received;
+  }
+  return photons;
+}
+
+void CausticGuide::lay_grid(const std::vector<Photon>& photons) {
+  // Around all but the stray ones, which a large scene has far away.
+  constexpr double kStray = 0.01;
+  std::vector<float> coordinates(photons.size());
+  glm::vec3 extent(0.0F);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::transform(photons.begin(), photons.end(), coordinates.begin(),
+                   [&](const Photon& p) { return p.position[axis]; });
+    std::sort(coordinates.begin(), coordinates.end());
+    const auto stray = static_cast<std::size_t>(kStray * static_cast<double>(coordinates.size()));
+    corner_[axis] = coordinates[stray];
+    extent[axis] = coordinates[coordinates.size() - 1 - stray] - corner_[axis];
+  }
+  const float longest = std::max(extent.x, std::max(extent.y, extent.z));
+  if (!(longest > 0.0F)) return;
+  cells_per_metre_ = kCells / longest;
+  // A cell more on each side, for what lies on the border.
+  size_ = glm::ivec3(glm::floor(extent * cells_per_metre_)) + 3;
+  corner_ -= 1.0F / cells_per_metre_;
+}
+
+void CausticGuide::fill(const std::vector<Photon>& photons, double irradiance_of_reflectors) {
+  constexpr std::int32_t kDark = -1;
+  std::vector<std::int32_t> slot(grid_index({0, 0, size_.z}), kDark);
+  std::vector<std::array<float, kBins>> histograms;
+  for (const Photon& photon : photons) {
+    // Into the eight cells around it.
+    const glm::vec3 place = (photon.position - corner_) * cells_per_metre_ - 0.5F;
+    const glm::vec3 base = glm::floor(place);
+    const glm::vec3 fraction = place - base;
+    const auto bin = static_cast<std::size_t>(bin_of(octahedral(photon.direction).point));
+    for (int k = 0; k < 8; ++k) {
+      const glm::ivec3 step(k & 1, (k >> 1) & 1, k >> 2);
+      const glm::vec3 c = base + glm::vec3(step);
+      if (!(c.x >= 0.0F && c.y >= 0.0F && c.z >= 0.0F && c.x < static_cast<float>(size_.x) &&
+            c.y < static_cast<float>(size_.y) && c.z < static_cast<float>(size_.z))) {
+        continue;
+      }
+      float weight = photon.power;
+      for (int axis = 0; axis < 3; ++axis) weight *= step[axis] == 1 ? fraction[axis] : 1.0F - fraction[axis];
+      std::int32_t& h = slot[grid_index(glm::ivec3(c))];
+      if (h == kDark) {
+        h = static_cast<std::int32_t>(histograms.size());
+        histograms.emplace_back();
+      }
+      histograms[static_cast<std::size_t>(h)][bin] += weight;
+    }
+  }
+
+  const double cell_area =
+      1.0 / (static_cast<double>(cells_per_metre_) * static_cast<double>(cells_per_metre_));
+  const double noticeable = kNoticeable * irradiance_of_reflectors;
+  grid_.resize(slot.size());
+  first_.push_back(0);
+  for (std::size_t c = 0; c < slot.size(); ++c) {
+    if (slot[c] == kDark) continue;
+    const std::array<float, kBins>& histogram = histograms[static_cast<std::size_t>(slot[c])];
+    double power = 0.0;
+    for (float value : histogram) power += static_cast<double>(value);
+    const double irradiance = power / cell_area;
+    const auto share = static_cast<float>(kLargestShare * irradiance / (irradiance + noticeable));
+    if (share < kLeastShare) continue;
+
+    grid_[c] = {share, static_cast<std::uint32_t>(first_.size() - 1)};
+    std::vector<double> powers;
+    for (std::size_t word = 0; word < kWords; ++word) {
+      LitBins lit;
+      lit.before = static_cast<std::uint32_t>(cdf_.size() + powers.size());
+      for (std::size_t bin = 64 * word; bin < 64 * word + 64; ++bin) {
+        if (!(histogram[bin] > 0.0F)) continue;
+        lit.bits |= std::uint64_t{1} << (bin % 64);
+        powers.push_back(static_cast<double>(histogram[bin]));
+        bins_.push_back(static_cast<std::uint16_t>(bin));
+      }
+      lit_.push_back(lit);
+    }
+    bins_.push_back(0);  // beside the last entry of the distribution
+    cdf_.resize(bins_.size());
+    normalise_cdf(&cdf_[first_.back()], powers.data(), static_cast<int>(powers.size()));
+    first_.push_back(static_cast<std::uint32_t>(cdf_.size()));
+  }
+}
+
+CausticGuide::CausticGuide(const World& world) {
+  const SpecularTriangles specular(world);
+  if (!(specular.area() > 0.0) || world.lights.empty()) return;
+  const Photons photons = shoot(world, specular);
+  if (photons.landed.empty()) return;
+  lay_grid(photons.landed);
+  if (size_.x > 0) fill(photons.landed, photons.received / specular.area());
+}
+
+glm::vec3 CausticGuide::sample(Cell cell, glm::vec2 u) const {
+  const std::uint32_t first = first_[cell.number];
+  const CdfSample lit = sample_cdf(&cdf_[first], static_cast<int>(first_[cell.number + 1] - first) - 1, u.x);
+  const int bin = bins_[first + static_cast<std::size_t>(lit.index)];
+  const int row = bin / kSide;
+  const glm::vec2 place(static_cast<float>(bin % kSide) + lit.place, static_cast<float>(row) + u.y);
+  return from_octahedral(place * (2.0F / kSide) - 1.0F);
+}
+
+float CausticGuide::pdf(Cell cell, glm::vec3 direction) const {
+  const Octahedral o = octahedral(direction);
+  const auto bin = static_cast<std::size_t>(bin_of(o.point));
+  const LitBins& lit = lit_[cell.number * kWords + bin / 64];
+  const std::uint64_t bit = std::uint64_t{1} << (bin % 64);
+  if ((lit.bits & bit) == 0) return 0.0F;
+  const float* cdf = &cdf_[lit.before + static_cast<std::size_t>(std::popcount(lit.bits & (bit - 1)))];
+  return (cdf[1] - cdf[0]) / (kBinArea * o.solid_angle);
+}
+
+}  // namespace mirrorbake::tracing

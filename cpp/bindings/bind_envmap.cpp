@@ -23,6 +23,9 @@ namespace {
 
 using Matrix3 = nb::ndarray<const float, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 
+// Memory to write to, of any shape.
+using FloatResult = nb::ndarray<float, nb::c_contig, nb::device::cpu>;
+
 EnvMapView view(const EnvMapLayout& layout, const FloatArray& values) {
   return {layout, {values.data(), values.size()}};
 }
@@ -96,22 +99,29 @@ void bind_envmap(nb::module_& m) {
       nb::sig("def half_from_float(layout: EnvMapLayout, values: NDArray[numpy.float32]) -> "
               "tuple[NDArray[numpy.uint16], int]"),
       "The bits of all values as IEEE 754 binary16, and how many were clamped to 65504.");
-  m.def(
-      "resample",
-      [](const EnvMapLayout& layout, FloatArray values, const std::string& projection, int width, int height,
-         const std::string& filter, Matrix3 source_from_target) {
-        const ResampleOptions options{parse_resample_filter(filter), matrix(source_from_target)};
-        const Projection target = parse_projection(projection);
-        EnvMap result;
-        {
-          nb::gil_scoped_release released;
-          result = resample(view(layout, values), target, width, height, options);
-        }
-        return block(std::move(result.values));
-      },
-      nb::arg("layout"), nb::arg("values"), nb::arg("projection"), nb::arg("width"), nb::arg("height"),
-      nb::arg("filter"), nb::arg("source_from_target"),
-      "The finest level in another projection and size: a block of one level.");
+  nb::class_<Resampler>(m, "Resampler",
+                        "Resamples maps of one layout, and keeps what every texel is made from.")
+      .def(
+          "__init__",
+          [](Resampler* self, const EnvMapLayout& source, const std::string& projection, int width,
+             int height, const std::string& filter, Matrix3 source_from_target, std::size_t max_bytes) {
+            const ResampleOptions options{parse_resample_filter(filter), matrix(source_from_target)};
+            const Projection target = parse_projection(projection);
+            nb::gil_scoped_release released;
+            new (self) Resampler(source, target, width, height, options, max_bytes);
+          },
+          nb::arg("source"), nb::arg("projection"), nb::arg("width"), nb::arg("height"), nb::arg("filter"),
+          nb::arg("source_from_target"), nb::arg("max_bytes"))
+      .def(
+          "apply",
+          [](const Resampler& self, const EnvMapLayout& layout, FloatArray values, FloatResult result) {
+            nb::gil_scoped_release released;
+            self.apply(view(layout, values), {result.data(), result.size()});
+          },
+          nb::arg("layout"), nb::arg("values"), nb::arg("result"),
+          "Writes the finest level of a map in the other projection and size into all of `result`.")
+      .def("layout", &Resampler::layout, nb::arg("channels"), "Layout of the result for so many channels.")
+      .def_prop_ro("bytes", &Resampler::bytes, "Memory of what is kept.");
 
   m.def(
       "build_mips",

@@ -1195,8 +1195,22 @@ def half_from_float(layout: EnvMapLayout, values: NDArray[numpy.float32]) -> tup
     The bits of all values as IEEE 754 binary16, and how many were clamped to 65504.
     """
 
-def resample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], projection: str, width: int, height: int, filter: str, source_from_target: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
-    """The finest level in another projection and size: a block of one level."""
+class Resampler:
+    """Resamples maps of one layout, and keeps what every texel is made from."""
+
+    def __init__(self, source: EnvMapLayout, projection: str, width: int, height: int, filter: str, source_from_target: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)], max_bytes: int) -> None: ...
+
+    def apply(self, layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], result: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None:
+        """
+        Writes the finest level of a map in the other projection and size into all of `result`.
+        """
+
+    def layout(self, channels: int) -> EnvMapLayout:
+        """Layout of the result for so many channels."""
+
+    @property
+    def bytes(self) -> int:
+        """Memory of what is kept."""
 
 def build_mips(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], filter: str) -> NDArray[numpy.float32]:
     """All levels from the finest: box, solid_angle or seamless."""

@@ -1,18 +1,15 @@
 #include "coverage.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace mirrorbake {
 
 void Coverage::rasterize(const std::array<glm::dvec2, 4>& p) {
-  left_ = static_cast<int>(std::floor(std::min(std::min(p[0].x, p[1].x), std::min(p[2].x, p[3].x))));
-  top_ = static_cast<int>(std::floor(std::min(std::min(p[0].y, p[1].y), std::min(p[2].y, p[3].y))));
-  const double right = std::max(std::max(p[0].x, p[1].x), std::max(p[2].x, p[3].x));
-  const double bottom = std::max(std::max(p[0].y, p[1].y), std::max(p[2].y, p[3].y));
-  width_ = static_cast<int>(right) + 1 - left_ + (right < 0.0 ? 1 : 0);
-  height_ = static_cast<int>(bottom) + 1 - top_ + (bottom < 0.0 ? 1 : 0);
+  left_ = floor_of(std::min(std::min(p[0].x, p[1].x), std::min(p[2].x, p[3].x)));
+  top_ = floor_of(std::min(std::min(p[0].y, p[1].y), std::min(p[2].y, p[3].y)));
+  width_ = floor_of(std::max(std::max(p[0].x, p[1].x), std::max(p[2].x, p[3].x))) + 1 - left_;
+  height_ = floor_of(std::max(std::max(p[0].y, p[1].y), std::max(p[2].y, p[3].y))) + 1 - top_;
   cells_.assign(static_cast<std::size_t>(width_ + 1) * static_cast<std::size_t>(height_), 0.0);
   // Edges leave the area to their right: in pixel coordinates, y down, that is positive for downward edges.
   sign_ = signed_area(p) > 0.0 ? -1.0 : 1.0;

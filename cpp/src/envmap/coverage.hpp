@@ -8,6 +8,12 @@
 
 namespace mirrorbake {
 
+/// std::floor, which is a call where the instruction set does not have it.
+inline int floor_of(double v) {
+  const int i = static_cast<int>(v);
+  return static_cast<double>(i) > v ? i - 1 : i;
+}
+
 /// Which part of every pixel a quadrilateral covers, exactly. Every edge leaves in each pixel row it crosses the signed
 /// area to its right, as two entries per crossed pixel, whose running sum along the row is the coverage (the
 /// accumulation buffer of anti-aliased font rasterisers). Neighbouring quadrilaterals share their edges, so that what
@@ -29,6 +35,11 @@ class Coverage {
         if (sign_ * area > kSmallest) visit(left_ + column, top_ + row, sign_ * area);
       }
     }
+  }
+
+  /// Most pixels that for_each_pixel() visits.
+  std::size_t most_pixels() const {
+    return static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   }
 
  private:

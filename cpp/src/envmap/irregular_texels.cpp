@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -15,10 +16,20 @@ namespace {
 
 double cross(glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; }
 
+// Parts of larger texels are rasterised one by one.
+constexpr double kLongest = 256.0;
+
+// Along an axis.
+double length_of(const Quad& quad) {
+  const glm::dvec2 p = glm::abs(quad[2] - quad[0]);
+  const glm::dvec2 q = glm::abs(quad[3] - quad[1]);
+  return std::max(std::max(p.x, p.y), std::max(q.x, q.y));
+}
+
 }  // namespace
 
 StraightLimits straight_limits(const EnvMapLayout& source) {
-  const double length = 0.25 * (source.width + 4);
+  const double length = std::min(0.25 * (source.width + 4), kLongest);
   constexpr double kAny = std::numeric_limits<double>::max();
   switch (source.projection.kind) {
     // Around the poles of a panorama images are long and bent along their length: n texels of the target away
@@ -38,36 +49,32 @@ bool is_straight(const Quad& quad, const StraightLimits& limits) {
   const glm::dvec2 bend = quad[0] + quad[2] - quad[1] - quad[3];
   const glm::dvec2 p = quad[2] - quad[0];
   const glm::dvec2 q = quad[3] - quad[1];
-  const double longest =
-      std::max(std::max(std::abs(p.x), std::abs(p.y)), std::max(std::abs(q.x), std::abs(q.y)));
+  const double longest = length_of(quad);
   return longest < limits.length &&
          std::abs(bend.x) + std::abs(bend.y) < std::max(kStraightBend, limits.per_length * longest) &&
          std::abs(cross(bend, p)) + std::abs(cross(bend, q)) <= limits.shift * std::abs(cross(p, q));
 }
 
-double interpolated_share(double side) { return std::clamp(4.0 - 4.0 * side, 0.0, 1.0); }
+double texel_side(double area, double squares) {
+  const double long_share = std::clamp(2.5 * squares / std::max(area, 1e-30) - 6.25, 0.0, 1.0);
+  const double wide2 = area * area * squares / std::max(squares * squares - area * area, 1e-30);
+  return std::sqrt(area + long_share * (wide2 - area));
+}
 
-DiscExtent disc_extent(ProjectionKind kind, glm::dvec2 low, glm::dvec2 high) {
-  if (kind == ProjectionKind::cube || kind == ProjectionKind::latlong) return DiscExtent::inside;
-  const glm::dvec2 a = glm::min(low, high);
-  const glm::dvec2 b = glm::max(low, high);
-  const glm::dvec2 nearest = glm::clamp(glm::dvec2(0.0), a, b);
-  const glm::dvec2 farthest = glm::max(glm::abs(a), glm::abs(b));
-  if (glm::dot(farthest, farthest) <= 1.0) return DiscExtent::inside;
-  return glm::dot(nearest, nearest) >= 1.0 ? DiscExtent::outside : DiscExtent::crosses_rim;
+double interpolated_share(double side) {
+  const double share = std::clamp(4.0 - 4.0 * side, 0.0, 1.0);
+  return share * share * (3.0 - 2.0 * share);
 }
 
 IrregularTexels::IrregularTexels(const ResampleJob& job)
     : job_(job),
-      limits_(straight_limits(job.source.layout)),
+      limits_(straight_limits(job.source)),
       limits_of_parts_(limits_),
-      radiance_(static_cast<std::size_t>(job.source.layout.channels)),
-      sample_(radiance_.size()),
-      point_(radiance_.size()) {
+      interpolated_(job.row_weights()) {
   limits_of_parts_.per_length *= 1.5;
 }
 
-IrregularTexels::Corner IrregularTexels::corner(int face, double x, double y) const {
+TexelCorner IrregularTexels::corner(int face, double x, double y) const {
   const glm::dvec3 d = job_.direction(face, x, y);
   const MapPoint point = point_from_direction(job_.projection(), d);
   if (!point.covered) {
@@ -83,24 +90,17 @@ IrregularTexels::Corners IrregularTexels::corners(int face, glm::dvec2 low, glm:
           corner(face, low.x, high.y)};
 }
 
-bool IrregularTexels::covered(const Corner& corner) const {
+bool IrregularTexels::covered(const TexelCorner& corner) const {
   return point_from_direction(job_.projection(), corner.direction).covered;
 }
 
-const float* IrregularTexels::texel(const Corner& corner) const {
-  const int column = std::clamp(static_cast<int>(corner.position.x), 0, job_.width() - 1);
-  const int row = std::clamp(static_cast<int>(corner.position.y), 0, job_.height() - 1);
-  return job_.source.values.data() + job_.source.layout.index(0, corner.face, row, column);
+TexelPlace IrregularTexels::texel(const TexelCorner& corner) const {
+  return {corner.face, std::clamp(static_cast<int>(corner.position.y), 0, job_.height() - 1),
+          std::clamp(static_cast<int>(corner.position.x), 0, job_.width() - 1)};
 }
 
-void IrregularTexels::add(const float* values, double weight) {
-  solid_angle_ += weight;
-  for (std::size_t c = 0; c < radiance_.size(); ++c) radiance_[c] += weight * static_cast<double>(values[c]);
-}
-
-// The texel as a quadrilateral in the plane of the source face of its first corner; nothing if it is not
-// close to one.
-std::optional<Quad> IrregularTexels::regular_quad(const Corners& corners, int depth) const {
+// The texel in the plane of the source face of its first corner.
+std::optional<Quad> IrregularTexels::quad_on_face(const Corners& corners) const {
   Quad quad;
   for (std::size_t i = 0; i < 4; ++i) {
     if (corners[i].face == corners[0].face) {
@@ -112,66 +112,115 @@ std::optional<Quad> IrregularTexels::regular_quad(const Corners& corners, int de
       quad[i] = job_.position(point->x, point->y);
     }
   }
-  if (job_.projection().kind == ProjectionKind::latlong) {
+  if (job_.is_periodic()) {
     for (glm::dvec2& p : quad) {
       if (p.x - quad[0].x > 0.5 * job_.width()) p.x -= job_.width();
       if (p.x - quad[0].x < -0.5 * job_.width()) p.x += job_.width();
     }
   }
-  return is_straight(quad, depth == 0 ? limits_ : limits_of_parts_) ? std::optional<Quad>(quad)
-                                                                    : std::nullopt;
+  return quad;
 }
 
-void IrregularTexels::write(int face, glm::dvec2 low, glm::dvec2 high, float* result) {
-  std::fill(sample_.begin(), sample_.end(), 0.0);
+std::optional<std::span<const Tap>> IrregularTexels::find(int face, glm::dvec2 low, glm::dvec2 high) {
+  taps_.clear();
   const Corners around = corners(face, low, high);
   const glm::dvec2 middle = 0.5 * (low + high);
+  clipped_ = disc_extent(job_.target.projection.kind, low, high) == DiscExtent::crosses_rim;
   double share = 0.0;
   if (job_.filter == ResampleFilter::automatic) share = interpolated_share(texels_across(face, low, high));
-  if (share < 1.0) {
-    std::fill(radiance_.begin(), radiance_.end(), 0.0);
-    solid_angle_ = 0.0;
-    clipped_ = disc_extent(job_.target.projection.kind, low, high) == DiscExtent::crosses_rim;
+  for (const Content content : {Content::constant_texels, Content::interpolated}) {
+    const double part = content == Content::interpolated ? share : 1.0 - share;
+    if (part == 0.0) continue;
+    start(content);
     gather(face, low, high, around, 0);
-    if (solid_angle_ > 0.0) {
-      for (std::size_t c = 0; c < sample_.size(); ++c) {
-        sample_[c] = (1.0 - share) / solid_angle_ * radiance_[c];
-      }
-    } else {
+    if (too_many_) return std::nullopt;
+    if (total_ == 0.0) {
       // A texel without area, such as one beyond the rim of a sphere map, which is all one direction.
-      const Corner center = corner(face, middle.x, middle.y);
-      if (covered(center)) {
-        const float* values = texel(center);
-        for (std::size_t c = 0; c < sample_.size(); ++c) {
-          sample_[c] = (1.0 - share) * static_cast<double>(values[c]);
-        }
-      }
+      const TexelCorner center = corner(face, middle.x, middle.y);
+      if (!covered(center)) continue;
+      gather_point(center, 1.0);
     }
+    for (const Tap& tap : part_) taps_.push_back({tap.texel, part / total_ * tap.weight});
   }
-  if (share > 0.0) {
-    const Corner center = corner(face, middle.x, middle.y);
-    if (covered(center)) {
-      interpolate(job_.source, 0, center.face, center.position.x, center.position.y, point_);
-      for (std::size_t c = 0; c < sample_.size(); ++c) sample_[c] += share * point_[c];
-    }
-  }
-  for (std::size_t c = 0; c < sample_.size(); ++c) result[c] = static_cast<float>(sample_[c]);
+  merge(taps_);
+  return taps_;
 }
 
-// The length of a texel over that of the source's there, the longer one of the latter.
+double IrregularTexels::stream(int face, glm::dvec2 low, glm::dvec2 high,
+                               const std::function<void(std::span<const Tap>)>& consume) {
+  start(Content::constant_texels);
+  consume_ = &consume;
+  clipped_ = disc_extent(job_.target.projection.kind, low, high) == DiscExtent::crosses_rim;
+  gather(face, low, high, corners(face, low, high), 0);
+  consume(part_);
+  consume_ = nullptr;
+  return total_;
+}
+
+void IrregularTexels::start(Content content) {
+  content_ = content;
+  too_many_ = false;
+  part_.clear();
+  total_ = 0.0;
+}
+
+void IrregularTexels::add(const TexelPlace& texel, double weight) {
+  if (too_many_ || !(weight > 0.0)) return;
+  if (part_.size() == kMostTaps) {
+    if (consume_ != nullptr) {
+      (*consume_)(part_);
+      part_.clear();
+    } else {
+      merge(part_);
+      too_many_ = part_.size() > kMostTaps / 2;
+      if (too_many_) return;
+    }
+  }
+  part_.push_back({texel, weight});
+  total_ += weight;
+}
+
+void IrregularTexels::merge(std::vector<Tap>& taps) {
+  // Down to the weight, so that the order of equal texels does not depend on the library.
+  const auto key = [](const Tap& tap) {
+    return std::tie(tap.texel.face, tap.texel.row, tap.texel.column, tap.weight);
+  };
+  std::sort(taps.begin(), taps.end(), [&](const Tap& a, const Tap& b) { return key(a) < key(b); });
+  std::size_t count = 0;
+  for (const Tap& tap : taps) {
+    if (count > 0 && taps[count - 1].texel == tap.texel) {
+      taps[count - 1].weight += tap.weight;
+    } else {
+      taps[count++] = tap;
+    }
+  }
+  taps.resize(count);
+}
+
+// As in ResampleKernels::classify(), with derivatives at the texel's centre for its edges.
 double IrregularTexels::texels_across(int face, glm::dvec2 low, glm::dvec2 high) const {
   const glm::dvec2 middle = 0.5 * (low + high);
-  const double area = std::abs((high.x - low.x) * (high.y - low.y));
-  const double length =
-      std::sqrt(area * solid_angle_density(job_.target.projection, face, middle.x, middle.y));
+  const MapJacobian of_target = map_jacobian(job_.target.projection, face, middle.x, middle.y);
   const MapPoint at = point_from_direction(job_.projection(), job_.direction(face, middle.x, middle.y));
-  const MapJacobian jacobian = map_jacobian(job_.projection(), at.face, at.x, at.y);
-  const double source =
-      std::max(2.0 / job_.width() * glm::length(jacobian.dx), 2.0 / job_.height() * glm::length(jacobian.dy));
-  return source > 0.0 ? length / source : 1.0;
+  const MapJacobian of_source = map_jacobian(job_.projection(), at.face, at.x, at.y);
+  // Per texel of the source, orthogonalised: (p, 0) and (shear, q).
+  const glm::dvec3 dx = 2.0 / job_.width() * of_source.dx;
+  const glm::dvec3 dy = 2.0 / job_.height() * of_source.dy;
+  const double p = std::max(glm::length(dx), 1e-9);
+  const double shear = glm::dot(dx, dy) / p;
+  const double q = std::max(std::sqrt(std::max(0.0, glm::dot(dy, dy) - shear * shear)), 1e-9);
+  const auto in_texels = [&](glm::dvec3 change) {
+    change = job_.source_from_target * change;
+    const double y = (glm::dot(dy, change) - shear / p * glm::dot(dx, change)) / (q * q);
+    return glm::dvec2(glm::dot(dx, change) / (p * p) - shear / p * y, y);
+  };
+  const glm::dvec2 a = in_texels((high.x - low.x) * of_target.dx);
+  const glm::dvec2 b = in_texels((high.y - low.y) * of_target.dy);
+  return texel_side(std::abs(cross(a, b)), glm::dot(a, a) + glm::dot(b, b));
 }
 
 void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, int depth) {
+  if (too_many_) return;
   const DiscExtent place =
       clipped_ ? disc_extent(job_.target.projection.kind, low, high) : DiscExtent::inside;
   if (place == DiscExtent::outside) return;
@@ -179,18 +228,27 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
   // sliver.
   std::array<int, 4> faces{};
   std::size_t count = 0;
-  for (const Corner& corner : corners) {
+  for (const TexelCorner& corner : corners) {
     const auto end = faces.begin() + static_cast<std::ptrdiff_t>(count);
     if (std::find(faces.begin(), end, corner.face) == end) faces[count++] = corner.face;
   }
+  // A texel across the rim of paraboloids lies on both, which go on beyond it: every part of it counts once.
+  const bool crosses_paraboloids = count > 1 && job_.projection().kind == ProjectionKind::dual_paraboloid;
+  if (crosses_paraboloids && depth >= kDeepestOnRim) {
+    const glm::dvec2 middle = 0.5 * (low + high);
+    faces[0] = corner(face, middle.x, middle.y).face;
+    count = 1;
+  }
   std::array<Quad, 4> quads;
-  bool regular = place == DiscExtent::inside;
+  bool regular = place == DiscExtent::inside && !(crosses_paraboloids && depth < kDeepestOnRim);
+  bool too_long = false;
   for (std::size_t f = 0; f < count && regular; ++f) {
     Corners seen = corners;
     // The face under consideration comes first, the order around the texel stays.
     while (seen[0].face != faces[f]) std::rotate(seen.begin(), seen.begin() + 1, seen.end());
-    const std::optional<Quad> quad = regular_quad(seen, depth);
-    regular = quad.has_value();
+    const std::optional<Quad> quad = quad_on_face(seen);
+    too_long = too_long || !quad || !(length_of(*quad) < limits_.length);
+    regular = quad && !too_long && is_straight(*quad, depth == 0 ? limits_ : limits_of_parts_);
     if (regular) quads[f] = *quad;
   }
   if (regular) {
@@ -198,41 +256,59 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
     return;
   }
   const glm::dvec2 middle = 0.5 * (low + high);
-  if (depth == (place == DiscExtent::crosses_rim ? kDeepestOnRim : kDeepest)) {
-    const Corner center = corner(face, middle.x, middle.y);
+  const int deepest = place == DiscExtent::crosses_rim ? kDeepestOnRim : too_long ? kDeepestIfLong : kDeepest;
+  if (depth >= deepest) {
+    const TexelCorner center = corner(face, middle.x, middle.y);
     if (!covered(center) || (clipped_ && glm::dot(middle, middle) > 1.0)) return;
     const double density = solid_angle_density(job_.target.projection, face, middle.x, middle.y);
-    add(texel(center), density * std::abs((high.x - low.x) * (high.y - low.y)));
+    gather_point(center, density * std::abs((high.x - low.x) * (high.y - low.y)));
     return;
   }
   // The corners of the four parts, row by row; the outer ones are known.
-  const Corner center = corner(face, middle.x, middle.y);
-  const Corner top = corner(face, middle.x, low.y);
-  const Corner right = corner(face, high.x, middle.y);
-  const Corner bottom = corner(face, middle.x, high.y);
-  const Corner left = corner(face, low.x, middle.y);
+  const TexelCorner center = corner(face, middle.x, middle.y);
+  const TexelCorner top = corner(face, middle.x, low.y);
+  const TexelCorner right = corner(face, high.x, middle.y);
+  const TexelCorner bottom = corner(face, middle.x, high.y);
+  const TexelCorner left = corner(face, low.x, middle.y);
   gather(face, low, middle, {corners[0], top, center, left}, depth + 1);
   gather(face, {middle.x, low.y}, {high.x, middle.y}, {top, corners[1], right, center}, depth + 1);
   gather(face, {low.x, middle.y}, {middle.x, high.y}, {left, center, bottom, corners[3]}, depth + 1);
   gather(face, middle, high, {center, right, corners[2], bottom}, depth + 1);
 }
 
+void IrregularTexels::gather_point(const TexelCorner& at, double weight) {
+  if (content_ == Content::constant_texels) return add(texel(at), weight);
+  emit_bilinear(job_.source, at.face, at.position.x, at.position.y,
+                [&](const TexelPlace& place, double share) { add(place, weight * share); });
+}
+
 void IrregularTexels::gather_quad(int face, const Quad& quad) {
-  const EnvMapLayout& layout = job_.source.layout;
-  const bool wraps = layout.projection.kind == ProjectionKind::latlong;
-  const float* first = job_.source.values.data() + layout.index(0, face, 0, 0);
+  const int width = job_.width();
+  const int height = job_.height();
+  if (content_ == Content::interpolated) {
+    constexpr double kAny = std::numeric_limits<double>::max();
+    interpolated_.integrate(quad, {job_.is_periodic() ? -kAny : 0.0, 0.0},
+                            {job_.is_periodic() ? kAny : width, height});
+    const glm::dvec2 middle = 0.25 * (quad[0] + quad[1] + quad[2] + quad[3]);
+    const double density = job_.is_periodic()
+                               ? 1.0
+                               : job_.weight(std::clamp(static_cast<int>(middle.y), 0, height - 1),
+                                             std::clamp(static_cast<int>(middle.x), 0, width - 1));
+    interpolated_.for_each_texel([&](int column, int row, double weight) {
+      emit_texel(job_.source, face, row, column, density * weight,
+                 [&](const TexelPlace& place, double share) { add(place, share); });
+    });
+    return;
+  }
   coverage_.rasterize(quad);
   coverage_.for_each_pixel([&](int column, int row, double area) {
-    if (row < 0 || row >= layout.height) return;
-    if (wraps) {
-      if (column < 0) column += layout.width;
-      if (column >= layout.width) column -= layout.width;
+    if (row < 0 || row >= height) return;
+    if (job_.is_periodic()) {
+      if (column < 0) column += width;
+      if (column >= width) column -= width;
     }
-    if (column < 0 || column >= layout.width) return;
-    const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(layout.width) +
-                          static_cast<std::size_t>(column);
-    const double weight = area * job_.weight(row, column);
-    if (weight > 0.0) add(first + i * radiance_.size(), weight);
+    if (column < 0 || column >= width) return;
+    add({face, row, column}, area * job_.weight(row, column));
   });
 }
 

@@ -15,12 +15,6 @@ inline double larger(double a, double b) { return a > b ? a : b; }
 // Rounding may put what lies on an edge a bit beyond it.
 inline double within(double v, double side) { return v > 0.0 ? (v < side ? v : side) : 0.0; }
 
-// Positions are above −2³⁰, where a conversion rounds towards zero.
-inline int floor_of(double v) {
-  const int i = static_cast<int>(v);
-  return static_cast<double>(i) > v ? i - 1 : i;
-}
-
 // Angle of the point (x, y), like std::atan2, within 1e-13 rad; 0 or ±π at the origin. One division: the
 // octant folds the slope into [0, 1], and (a − b)/(a + b) turns it by another 45° if it is above tan(π/8).
 // The polynomial is the best one for atan(t)/t in t² on [0, tan²(π/8)] (Remez, relative error 2.6e-14).
@@ -140,10 +134,12 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
     const bool straight =
         (magnitude(bend_x) + magnitude(bend_y) < larger(kStraightBend, per_length * longest)) &
         (shift <= most_shift * cross) & (longest < farthest) & (side > 1e-6);
-    // Above 0 from one texel down, 1 from three quarters down.
+    // Above 0 from one texel down, 1 from three quarters down, and smooth in between: where it bends, the one
+    // filter takes what the other does not give.
     double share = automatic ? 4.0 - 4.0 * side : 0.0;
     share = share > 0.0 ? share : 0.0;
     share = share < 1.0 ? share : 1.0;
+    share = share * share * (3.0 - 2.0 * share);
     shares[i] = static_cast<float>(straight ? share : -1.0);
   }
   const std::int32_t* __restrict above_face = above.face;
@@ -161,303 +157,192 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
   return all;
 }
 
-void centers(const PositionArrays& above, const PositionArrays& below, std::size_t count,
-             const PositionArrays& result) {
-  const double* __restrict ax = above.x;
-  const double* __restrict ay = above.y;
-  const double* __restrict bx = below.x;
-  const double* __restrict by = below.y;
-  double* __restrict x = result.x;
-  double* __restrict y = result.y;
-  for (std::size_t i = 0; i < count; ++i) {
-    x[i] = 0.25 * (ax[i] + ax[i + 1] + bx[i] + bx[i + 1]);
-    y[i] = 0.25 * (ay[i] + ay[i + 1] + by[i] + by[i + 1]);
-    result.face[i] = above.face[i];
-  }
+// Σ (−z)^k / (2k + 1)! is sin(√z)/√z, and z ≤ 2π² on an angular map's square: what is left out is below 1e-11.
+inline float sine_quotient(float z2) {
+  const double z = static_cast<double>(z2);
+  double p = 1.0;
+  for (int k = 13; k > 0; --k) p = 1.0 - z * p / (2.0 * k * (2.0 * k + 1.0));
+  return static_cast<float>(magnitude(p));
 }
 
-void takes_area(const std::uint8_t* __restrict kinds, const std::int32_t* __restrict faces, std::int32_t face,
-                std::size_t count, std::uint8_t* __restrict takes) {
-  for (std::size_t i = 0; i < count; ++i) {
-    takes[i] = static_cast<std::uint8_t>(faces[i] == face ? kinds[i] & kArea : 0);
-  }
-}
-
-bool either(const std::uint8_t* a, const std::uint8_t* b, std::size_t count,
-            std::uint8_t* __restrict result) {
-  std::uint8_t any = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    result[i] = a[i] | b[i];
-    any |= result[i];
-  }
-  return any != 0;
-}
-
-void bounds(const double* __restrict x, const double* __restrict y, const std::uint8_t* __restrict flags,
-            std::size_t count, double* low, double* high) {
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!flags[i]) continue;
-    low[0] = x[i] < low[0] ? x[i] : low[0];
-    low[1] = y[i] < low[1] ? y[i] : low[1];
-    high[0] = x[i] > high[0] ? x[i] : high[0];
-    high[1] = y[i] > high[1] ? y[i] : high[1];
-  }
-}
-
-// Four doubles at any address; one AVX register, or two of SSE2.
-typedef double Four __attribute__((vector_size(32)));
-typedef double FourAnywhere __attribute__((vector_size(32), aligned(8), may_alias));
-typedef float FourFloats __attribute__((vector_size(16), aligned(4), may_alias));
-
-inline Four load(const double* from) { return *reinterpret_cast<const FourAnywhere*>(from); }
-inline void store(double* to, Four value) { *reinterpret_cast<FourAnywhere*>(to) = value; }
-constexpr Four kLastOne = {0.0, 0.0, 0.0, 1.0};
-
-bool is_finite(const double* sums, int count) {
-  bool finite = true;
-  for (int k = 0; k < count; ++k) finite = finite && sums[k] - sums[k] == 0.0;
-  return finite;
-}
-
-// Three channels of texels of three: the hot case. A texel is read with the next one's first value, but for
-// the last.
-bool running_sums_rgb(const float* __restrict texels, const double* __restrict weights, int weight_step,
-                      int width, const FluxWindow& window, double* __restrict result) {
-  typedef std::int64_t Mask __attribute__((vector_size(32)));
-  constexpr Mask kThree = {-1, -1, -1, 0};
-  Four sum = {0.0, 0.0, 0.0, 0.0};
-  int from = window.column % width;
-  if (from < 0) from += width;
-  for (int i = 0; i < window.columns; ++i) {
-    store(result + 4 * static_cast<std::size_t>(i), sum);
-    const float* t = texels + 3 * static_cast<std::size_t>(from);
-    const double weight = weights[from * weight_step];
-    Four value;
-    if (from + 1 < width) {
-      value = __builtin_convertvector(*reinterpret_cast<const FourFloats*>(t), Four);
-      value = kThree ? value : kLastOne;
-    } else {
-      value = Four{static_cast<double>(t[0]), static_cast<double>(t[1]), static_cast<double>(t[2]), 1.0};
-    }
-    sum += weight * value;
-    if (++from == width) from = 0;
-  }
-  double* end = result + 4 * static_cast<std::size_t>(window.columns);
-  store(end, sum);
-  store(end + 4, sum);
-  return is_finite(end, 4);
-}
-
-bool running_sums(const float* texels, const double* weights, int weight_step, int width,
-                  const FluxWindow& window, int first, int channels, int stride, double* result) {
-  if (channels == 3 && stride == 3 && window.blocks == 1) {
-    return running_sums_rgb(texels, weights, weight_step, width, window, result);
-  }
-  const int sums = 4 * window.blocks;
-  for (int k = 0; k < sums; ++k) result[k] = 0.0;
-  int from = window.column % width;
-  if (from < 0) from += width;
-  for (int i = 0; i < window.columns; ++i) {
-    const float* texel = texels + static_cast<std::size_t>(from) * static_cast<std::size_t>(stride) + first;
-    const double weight = weights[from * weight_step];
-    const double* before = result;
-    result += sums;
-    for (int k = 0; k < sums; ++k) result[k] = before[k];
-    for (int k = 0; k < channels; ++k) result[k] += weight * static_cast<double>(texel[k]);
-    result[sums - 1] += weight;
-    if (++from == width) from = 0;
-  }
-  for (int k = 0; k < sums; ++k) result[sums + k] = result[k];
-  return is_finite(result, sums);
-}
-
-// Of edges within the window, in its coordinates. Along a piece within one texel the running sum is linear in
-// x, so that its value in the middle is the mean.
-template <int kBlocks>
-class EdgeWalk {
- public:
-  explicit EdgeWalk(const FluxWindow& window)
-      : running_(window.running), line_((static_cast<std::size_t>(window.columns) + 2) * 4 * kBlocks) {}
-
-  // From the smaller to the larger y; `sign` is the direction.
-  inline void walk(double x0, double y0, double x1, double y1, double sign) {
-    const double slope = (x1 - x0) / (y1 - y0);
-    int row = static_cast<int>(y0);
-    const double* sums = running_ + static_cast<std::size_t>(row) * line_;
-    double x = x0;
-    double y = y0;
-    for (;;) {
-      ++row;
-      const double end = static_cast<double>(row);
-      if (!(end < y1)) break;
-      const double next = x0 + slope * (end - y0);
-      in_row(sums, x, next, sign * (end - y));
-      x = next;
-      y = end;
-      sums += line_;
-    }
-    in_row(sums, x, x1, sign * (y1 - y));
-  }
-
-  Four sum[kBlocks] = {};
-
- private:
-  inline void in_row(const double* sums, double from, double to, double dy) {
-    const double low = from < to ? from : to;
-    const double high = from < to ? to : from;
-    int column = static_cast<int>(low);
-    double end = column + 1;
-    if (!(end < high)) {
-      piece(sums, column, 0.5 * (low + high), dy);
+void multiply_density(const TexelDensity& density, const std::uint16_t* __restrict rows,
+                      const std::uint16_t* __restrict columns, std::size_t count, float* __restrict weights) {
+  const float per_column = 2.0F / static_cast<float>(density.width);
+  const float per_row = 2.0F / static_cast<float>(density.height);
+  const auto radius2 = [&](std::size_t i) {
+    const float x = (static_cast<float>(columns[i]) + 0.5F) * per_column - 1.0F;
+    const float y = (static_cast<float>(rows[i]) + 0.5F) * per_row - 1.0F;
+    return x * x + y * y;
+  };
+  switch (density.kind) {
+    case TexelDensity::equal: return;
+    case TexelDensity::cube:
+      for (std::size_t i = 0; i < count; ++i) {
+        const float q = 1.0F + radius2(i);
+        weights[i] /= q * __builtin_sqrtf(q);
+      }
+      return;
+    case TexelDensity::paraboloid:
+      for (std::size_t i = 0; i < count; ++i) {
+        const float q = 1.0F + radius2(i);
+        weights[i] /= q * q;
+      }
+      return;
+    case TexelDensity::fisheye: {
+      const float square = static_cast<float>(density.half_angle * density.half_angle);
+      for (std::size_t i = 0; i < count; ++i) weights[i] *= sine_quotient(square * radius2(i));
       return;
     }
-    const double per_x = dy / (high - low);
-    double x = low;
-    do {
-      piece(sums, column, 0.5 * (x + end), per_x * (end - x));
-      x = end;
-      ++column;
-      end = column + 1;
-    } while (end < high);
-    piece(sums, column, 0.5 * (x + high), per_x * (high - x));
   }
+}
 
-  inline void piece(const double* sums, int column, double x, double dy) {
-    const double right = dy * (x - column);
-    const double left = dy - right;
-    const double* a = sums + static_cast<std::size_t>(column) * 4 * kBlocks;
-    for (int k = 0; k < kBlocks; ++k) sum[k] += left * load(a + 4 * k) + right * load(a + 4 * (kBlocks + k));
+std::uint32_t number_texels(const TexelNumbering& numbering, const std::uint16_t* __restrict rows,
+                            const std::uint16_t* __restrict columns, std::size_t count,
+                            std::uint32_t* __restrict numbers) {
+  const TexelNumbering n = numbering;
+  const std::uint32_t width = static_cast<std::uint32_t>(n.width);
+  std::uint32_t largest = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t row = rows[i];
+    const std::int32_t column = columns[i];
+    const std::int32_t at = n.column_per_row * row + n.column_per_column * column + n.column_offset;
+    std::uint32_t number = n.first + n.per_row * static_cast<std::uint32_t>(row) +
+                           n.per_column * static_cast<std::uint32_t>(column);
+    number += at < 0 ? width : 0U;
+    number -= at >= n.width ? width : 0U;
+    numbers[i] = number;
+    largest = number > largest ? number : largest;
   }
+  return largest;
+}
 
-  const double* running_;
-  std::size_t line_;
+// Sums in float of more taps than these lose digits.
+constexpr std::uint32_t kFloatTaps = 32;
+
+typedef float FourFloats __attribute__((vector_size(16)));
+typedef float FourAnywhere __attribute__((vector_size(16), aligned(4), may_alias));
+typedef double FourDoubles __attribute__((vector_size(32)));
+
+inline FourFloats load(const float* from) { return *reinterpret_cast<const FourAnywhere*>(from); }
+
+// Several values of a texel side by side. `kStride` 0: known at run time only.
+template <int kValues>
+struct Lanes;
+
+template <>
+struct Lanes<1> {
+  typedef float Floats;
+  typedef double Doubles;
+  static Floats read(const float* from) { return *from; }
+  static Doubles widen(Floats v) { return static_cast<double>(v); }
+  static Floats narrow(Doubles v) { return static_cast<float>(v); }
+  static void write(float* to, Floats v) { *to = v; }
 };
 
-template <int kBlocks>
-void edge_integrals_of(const FluxWindow& window, const double* x0, const double* y0, const double* x1,
-                       const double* y1, const std::uint8_t* needed, std::size_t count, double* result) {
-  const double column = window.column;
-  const double row = window.row;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!needed[i]) continue;
-    EdgeWalk<kBlocks> edge(window);
-    const bool down = y0[i] < y1[i];
-    const double ya = down ? y0[i] : y1[i];
-    const double yb = down ? y1[i] : y0[i];
-    const double xa = down ? x0[i] : x1[i];
-    const double xb = down ? x1[i] : x0[i];
-    if (ya < yb) edge.walk(xa - column, ya - row, xb - column, yb - row, down ? 1.0 : -1.0);
-    for (int k = 0; k < kBlocks; ++k) {
-      store(result + 4 * (i * kBlocks + static_cast<std::size_t>(k)), edge.sum[k]);
-    }
-  }
-}
+template <>
+struct Lanes<4> {
+  typedef FourFloats Floats;
+  typedef FourDoubles Doubles;
+  static Floats read(const float* from) { return load(from); }
+  static Doubles widen(Floats v) { return __builtin_convertvector(v, FourDoubles); }
+  static Floats narrow(Doubles v) { return __builtin_convertvector(v, FourFloats); }
+  static void write(float* to, Floats v) { *reinterpret_cast<FourAnywhere*>(to) = v; }
+};
 
-void edge_integrals(const FluxWindow& window, const double* x0, const double* y0, const double* x1,
-                    const double* y1, const std::uint8_t* needed, std::size_t count, double* result) {
-  if (window.blocks == 1) {
-    edge_integrals_of<1>(window, x0, y0, x1, y1, needed, count, result);
-  } else {
-    edge_integrals_of<2>(window, x0, y0, x1, y1, needed, count, result);
+// Three values, read as four.
+template <>
+struct Lanes<3> : Lanes<4> {
+  static void write(float* to, Floats v) {
+    typedef float Two __attribute__((vector_size(8), aligned(4), may_alias));
+    *reinterpret_cast<Two*>(to) = Two{v[0], v[1]};
+    to[2] = v[2];
   }
-}
+};
 
-void means_from_edges(const double* __restrict top, const double* __restrict bottom,
-                      const double* __restrict verticals, const std::uint8_t* __restrict takes,
-                      std::size_t count, int blocks, int channels, int stride, float* __restrict result) {
-  const std::size_t sums = 4 * static_cast<std::size_t>(blocks);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!takes[i]) continue;
-    // Clockwise from the top left, or the other way round if the map mirrors: the sign cancels.
-    double flux[8];
-    for (std::size_t k = 0; k < sums; k += 4) {
-      const std::size_t j = i * sums + k;
-      store(flux + k, load(top + j) + load(verticals + j + sums) - load(bottom + j) - load(verticals + j));
-    }
-    const double scale = 1.0 / flux[sums - 1];
-    float* to = result + i * static_cast<std::size_t>(stride);
-    for (int k = 0; k < channels; ++k) to[k] = static_cast<float>(flux[k] * scale);
-  }
-}
-
-template <int kChannels>
-void interpolate_of(const FaceTexels& source, const double* x, const double* y, const std::int32_t* face,
-                    const std::uint8_t* kinds, const float* share, std::size_t count,
-                    float* __restrict result, std::uint8_t* missed) {
-  const int c = kChannels > 0 ? kChannels : source.channels;
-  const std::size_t texel = static_cast<std::size_t>(c);
-  const std::size_t line = static_cast<std::size_t>(source.width) * texel;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!(kinds[i] & kInterpolate)) continue;
-    const double px = x[i] - 0.5;
-    const double py = y[i] - 0.5;
-    int column = floor_of(px);
-    const int row = floor_of(py);
-    const float fx = static_cast<float>(px - column);
-    const float fy = static_cast<float>(py - row);
-    if (row < 0 || row + 1 >= source.height) {
-      missed[i] = 1;
-      continue;
-    }
-    int next = column + 1;
-    if (source.wraps) {
-      if (column < 0) column += source.width;
-      if (column >= source.width) column -= source.width;
-      next = column + 1 == source.width ? 0 : column + 1;
-    }
-    if (column < 0 || next >= source.width) {
-      missed[i] = 1;
-      continue;
-    }
-    const float* above = source.values +
-                         static_cast<std::size_t>(face[i]) * static_cast<std::size_t>(source.height) * line +
-                         static_cast<std::size_t>(row) * line;
-    const float* a = above + static_cast<std::size_t>(column) * texel;
-    const float* b = above + static_cast<std::size_t>(next) * texel;
-    const float wa = (1.0F - fx) * (1.0F - fy);
-    const float wb = fx * (1.0F - fy);
-    const float wc = (1.0F - fx) * fy;
-    const float wd = fx * fy;
-    float* to = result + i * texel;
-    if (kinds[i] == kInterpolate) {
-      for (int k = 0; k < c; ++k) {
-        const std::size_t j = static_cast<std::size_t>(k);
-        to[j] = wa * a[j] + wb * b[j] + wc * a[line + j] + wd * b[line + j];
-      }
+template <int kValues, int kStride, std::uint32_t kTaps>
+void apply_group(const float* __restrict values, std::size_t stride_, const std::uint32_t* __restrict taps,
+                 const float* __restrict weights, TapGroup group, const std::uint32_t* __restrict targets,
+                 float* __restrict result) {
+  typedef Lanes<kValues> L;
+  const std::size_t stride = kStride > 0 ? kStride : stride_;
+  for (std::uint32_t i = 0; i < group.targets; ++i) {
+    typename L::Floats sum = {};
+    if constexpr (kTaps > 0) {
+#pragma GCC unroll 16
+      for (std::uint32_t k = 0; k < kTaps; ++k) sum += weights[k] * L::read(values + taps[k] * stride);
+      taps += kTaps;
+      weights += kTaps;
+    } else if (group.taps <= kFloatTaps) {
+      for (std::uint32_t k = 0; k < group.taps; ++k) sum += weights[k] * L::read(values + taps[k] * stride);
+      taps += group.taps;
+      weights += group.taps;
     } else {
-      const float s = share[i];
-      for (int k = 0; k < c; ++k) {
-        const std::size_t j = static_cast<std::size_t>(k);
-        to[j] = (1.0F - s) * to[j] + s * (wa * a[j] + wb * b[j] + wc * a[line + j] + wd * b[line + j]);
+      typename L::Doubles whole = {};
+      for (std::uint32_t k = 0; k < group.taps; k += kFloatTaps) {
+        const std::uint32_t rest = group.taps - k;
+        const std::uint32_t end = rest < kFloatTaps ? rest : kFloatTaps;
+        typename L::Floats part = {};
+        for (std::uint32_t j = 0; j < end; ++j) part += weights[j] * L::read(values + taps[j] * stride);
+        whole += L::widen(part);
+        taps += end;
+        weights += end;
       }
+      sum = L::narrow(whole);
     }
+    L::write(result + targets[i] * stride, sum);
   }
 }
 
-void interpolate(const FaceTexels& source, const double* x, const double* y, const std::int32_t* face,
-                 const std::uint8_t* kinds, const float* share, std::size_t count, float* result,
-                 std::uint8_t* missed) {
-  switch (source.channels) {
-    case 1: return interpolate_of<1>(source, x, y, face, kinds, share, count, result, missed);
-    case 3: return interpolate_of<3>(source, x, y, face, kinds, share, count, result, missed);
-    case 4: return interpolate_of<4>(source, x, y, face, kinds, share, count, result, missed);
-    default: return interpolate_of<0>(source, x, y, face, kinds, share, count, result, missed);
+template <int kValues, int kStride>
+void apply_groups(const float* values, std::size_t stride, const std::uint32_t* taps, const float* weights,
+                  const TapGroup* groups, std::size_t group_count, const std::uint32_t* targets,
+                  float* result) {
+  typedef void (*Apply)(const float*, std::size_t, const std::uint32_t*, const float*, TapGroup,
+                        const std::uint32_t*, float*);
+  static constexpr Apply kApply[] = {
+      apply_group<kValues, kStride, 0>,  apply_group<kValues, kStride, 1>,  apply_group<kValues, kStride, 2>,
+      apply_group<kValues, kStride, 3>,  apply_group<kValues, kStride, 4>,  apply_group<kValues, kStride, 5>,
+      apply_group<kValues, kStride, 6>,  apply_group<kValues, kStride, 7>,  apply_group<kValues, kStride, 8>,
+      apply_group<kValues, kStride, 9>,  apply_group<kValues, kStride, 10>, apply_group<kValues, kStride, 11>,
+      apply_group<kValues, kStride, 12>, apply_group<kValues, kStride, 13>, apply_group<kValues, kStride, 14>,
+      apply_group<kValues, kStride, 15>, apply_group<kValues, kStride, 16>};
+  constexpr std::uint32_t kMost = sizeof(kApply) / sizeof(kApply[0]);
+  for (std::size_t g = 0; g < group_count; ++g) {
+    const TapGroup group = groups[g];
+    kApply[group.taps < kMost ? group.taps : 0](values, stride, taps, weights, group, targets, result);
+    const std::size_t count = static_cast<std::size_t>(group.taps) * group.targets;
+    taps += count;
+    weights += count;
+    targets += group.targets;
+  }
+}
+
+void apply(const float* values, int channels, const std::uint32_t* taps, const float* weights,
+           const TapGroup* groups, std::size_t group_count, const std::uint32_t* targets, bool may_read_past,
+           float* result) {
+  const std::size_t stride = static_cast<std::size_t>(channels);
+  if (channels == 1) {
+    return apply_groups<1, 1>(values, stride, taps, weights, groups, group_count, targets, result);
+  }
+  if (channels == 3 && may_read_past) {
+    return apply_groups<3, 3>(values, stride, taps, weights, groups, group_count, targets, result);
+  }
+  if (channels == 4) {
+    return apply_groups<4, 4>(values, stride, taps, weights, groups, group_count, targets, result);
+  }
+  int first = 0;
+  for (; first + 4 <= channels; first += 4) {
+    apply_groups<4, 0>(values + first, stride, taps, weights, groups, group_count, targets, result + first);
+  }
+  for (; first < channels; ++first) {
+    apply_groups<1, 0>(values + first, stride, taps, weights, groups, group_count, targets, result + first);
   }
 }
 
 }  // namespace
 
-extern const ResampleKernels kResampleKernels = {latlong_positions,
-                                                 cube_positions,
-                                                 dual_paraboloid_positions,
-                                                 classify,
-                                                 centers,
-                                                 takes_area,
-                                                 either,
-                                                 bounds,
-                                                 running_sums,
-                                                 edge_integrals,
-                                                 means_from_edges,
-                                                 interpolate};
+extern const ResampleKernels kResampleKernels = {
+    latlong_positions, cube_positions, dual_paraboloid_positions, classify, multiply_density,
+    number_texels,     apply};
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

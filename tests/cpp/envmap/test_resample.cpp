@@ -239,6 +239,120 @@ TEST(Resample, ANaNTexelStaysWhereItIs) {
   EXPECT_LE(bad, 4);
 }
 
+// A turn by 1e-6 leaves no symmetries, and the values where they are up to that.
+TEST(Resample, SymmetriesChangeNothing) {
+  const float angle = 1e-6F;
+  const glm::mat3 turn(glm::vec3(1, angle, -angle), glm::vec3(-angle, 1, angle), glm::vec3(angle, -angle, 1));
+  const auto lopsided = [](glm::dvec3 d) {
+    return 3.0 + d.x + 0.7 * d.y - 0.4 * d.z + std::sin(9.0 * d.x + 7.0 * d.y);
+  };
+  for (const char* from : kProjections) {
+    for (const int size : {24, 25}) {
+      const EnvMap source = make_map(from, size, size, lopsided);
+      for (const char* to : kProjections) {
+        for (const ResampleFilter filter : {ResampleFilter::area, ResampleFilter::bilinear}) {
+          for (const int target_size : {13, 44}) {
+            // The centre of a texel of 13 looks exactly at the rim of such maps.
+            const bool singular = std::string(from) != "cube" && std::string(from) != "latlong";
+            if (singular && target_size == 13 && filter == ResampleFilter::bilinear) continue;
+            const Projection target = parse_projection(to);
+            const EnvMap straight = resample(source, target, target_size, target_size, {filter});
+            const EnvMap turned = resample(source, target, target_size, target_size, {filter, turn});
+            const std::vector<double> angles = texel_solid_angles(target, target_size, target_size);
+            double difference = 0.0;
+            for (std::size_t i = 0; i < straight.values.size(); ++i) {
+              difference += angles[i % angles.size()] *
+                            std::abs(static_cast<double>(straight.values[i] - turned.values[i]));
+            }
+            // On the average over the sphere: at rims a turn of any size may take another texel.
+            EXPECT_LT(difference / (4.0 * std::numbers::pi), 5e-3)
+                << from << " of " << size << " to " << to << " of " << target_size;
+          }
+        }
+      }
+    }
+  }
+}
+
+// Every texel looks up the direction it had: what symmetries do to rows, columns and faces is what they do to
+// directions. The bound is a bit more than half the diagonal of a texel.
+TEST(Resample, EveryTexelFindsItsDirection) {
+  for (const char* from : kProjections) {
+    for (const int size : {40, 41}) {
+      std::vector<EnvMap> sources;
+      const int width = std::string(from) == "latlong" ? 2 * size : size;
+      for (int axis = 0; axis < 3; ++axis) {
+        sources.push_back(make_map(from, width, size, [&](glm::dvec3 d) { return d[axis]; }));
+      }
+      for (const char* to : {"cube", "dual_paraboloid", "latlong", "angular"}) {
+        const Projection target = parse_projection(to);
+        EnvMap results[3];
+        for (int axis = 0; axis < 3; ++axis)
+          results[axis] = resample(sources[static_cast<std::size_t>(axis)], target, 36, 36);
+        for (int face = 0; face < face_count(target); ++face) {
+          for (int row = 0; row < 36; ++row) {
+            for (int column = 0; column < 36; ++column) {
+              const double x = column_center(column, 36);
+              const double y = row_center(row, 36);
+              // Around the singular points of maps texels are long.
+              if (target.kind != ProjectionKind::cube && x * x + y * y > 0.8) continue;
+              const glm::dvec3 d = direction_from_point(target, face, x, y);
+              if (std::abs(d.y) > 0.9 || std::abs(d.z) > 0.9) continue;
+              const std::size_t i = results[0].layout.index(0, face, row, column);
+              const glm::dvec3 found(results[0].values[i], results[1].values[i], results[2].values[i]);
+              ASSERT_LT(glm::length(found - d), 0.1)
+                  << from << " to " << to << " face " << face << " row " << row << " column " << column;
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Resample, AResamplerGivesTheSameBitsWhateverItKeeps) {
+  const EnvMap source = make_map("latlong", 96, 48, lights);
+  const Projection cube = parse_projection("cube");
+  const EnvMap expected = resample(source, cube, 33, 33);
+  for (const std::size_t bytes : {std::size_t{0}, std::size_t{5000}, std::size_t{1} << 30}) {
+    const Resampler resampler(source.layout, cube, 33, 33, {}, bytes);
+    EXPECT_LE(resampler.bytes(), bytes);
+    EXPECT_EQ(resampler.apply(source).values, expected.values) << bytes;
+    EXPECT_EQ(resampler.apply(source).values, expected.values) << "again, " << bytes;
+  }
+  const Resampler resampler(source.layout, cube, 33, 33);
+  EXPECT_GT(resampler.bytes(), 10000U);
+  const EnvMap other = make_map("latlong", 98, 49, lights);
+  EXPECT_THROW(resampler.apply(other), InvalidArgument);
+  std::vector<float> small(10);
+  EXPECT_THROW(resampler.apply(source, small), InvalidArgument);
+}
+
+// Texels of more taps than are kept in memory: the mean is the flux over 4π.
+TEST(Resample, ATexelOfTheWholeSphereIsItsMean) {
+  const EnvMap source = make_map("latlong", 2048, 1024, lights);
+  const double mean = integrate(source)[0] / (4.0 * std::numbers::pi);
+  const EnvMap whole = resample(source, parse_projection("latlong"), 1, 1);
+  EXPECT_NEAR(whole.values[0] / mean, 1.0, 1e-6);
+  // What the straight edges of parts around the poles move from one face to the other.
+  const EnvMap cube = resample(source, parse_projection("cube"), 1, 1);
+  EXPECT_NEAR(integrate(cube)[0] / (4.0 * std::numbers::pi) / mean, 1.0, 0.01);
+}
+
+// Interpolation, too: it is integrated over the texel. Maps of about as many texels; the coarse ones of the
+// test data in test_envmap.py are harder.
+TEST(Resample, AutomaticKeepsTheFluxOfLights) {
+  const EnvMap source = make_map("latlong", 512, 256, lights);
+  const std::pair<const char*, int> targets[] = {
+      {"cube", 209}, {"dual_paraboloid", 362}, {"sphere_map", 512}, {"angular", 512}, {"cube", 400}};
+  for (const auto& [to, size] : targets) {
+    const EnvMap result = resample(source, parse_projection(to), size, size);
+    EXPECT_NEAR(integrate(result)[0] / integrate(source)[0], 1.0, 1e-3) << to << " of " << size;
+    const EnvMap back = resample(result, parse_projection("latlong"), 512, 256);
+    EXPECT_NEAR(integrate(back)[0] / integrate(result)[0], 1.0, 1e-3) << to << " of " << size << " and back";
+  }
+}
+
 TEST(Resample, WhatAFisheyeDoesNotSeeIsBlack) {
   const EnvMap source = make_map("fisheye:180", 64, 64, [](glm::dvec3) { return 1.0; });
   const EnvMap result = resample(source, parse_projection("cube"), 16, 16);

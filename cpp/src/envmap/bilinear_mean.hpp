@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+namespace mirrorbake {
+
+/// The corners of a texel, in order around it, in texels of a face of the source.
+using Quad = std::array<glm::dvec2, 4>;
+
+/// Integrals over a quadrilateral of the bilinear interpolation of texels, exactly: the weights of the texels.
+/// The plane is cut into cells, each with the centres of four texels for its corners. In a cell the weights are
+/// products of u, v, 1 − u and 1 − v, so that the area, the two first moments and the mixed second moment of
+/// the part of the quadrilateral in the cell are all that is needed.
+///
+/// Where rows of texels have different solid angles, the integral is one over solid angle, that of a cell the
+/// mean of its rows: long images of texels around a pole need it.
+class BilinearMean {
+ public:
+  /// `row_weights`: solid angles of texels by row, which are referred to, or none if they are all alike.
+  explicit BilinearMean(std::span<const double> row_weights) : row_weights_(row_weights) {}
+
+  /// Takes a quadrilateral that does not intersect itself, or the part of it between two columns and rows.
+  void integrate(const Quad& quad) { integrate_polygon(quad); }
+  void integrate(const Quad& quad, glm::dvec2 low, glm::dvec2 high);
+
+  /// Integral of 1: the area, or the solid angle.
+  double area() const { return area_; }
+
+  /// Multiplies all weights; adds to that of a texel that the quadrilateral covers a part of.
+  void scale(double factor) {
+    for (double& w : weights_) w *= factor;
+    area_ *= factor;
+  }
+  void add(int column, int row, double weight) {
+    weights_[static_cast<std::size_t>(row - top_) * static_cast<std::size_t>(columns_) +
+             static_cast<std::size_t>(column - left_)] += weight;
+  }
+
+  /// Most texels that for_each_texel() visits.
+  std::size_t most_texels() const { return weights_.size(); }
+  /// Whether all of them are texels of a face.
+  bool is_within(int width, int height) const {
+    return left_ >= 0 && top_ >= 0 && left_ + columns_ <= width && top_ + rows_ <= height;
+  }
+
+  /// Calls visit(column, row, weight) for the texels with weight; the weights add up to area(). Columns and
+  /// rows may be one beyond the face.
+  template <typename Visit>
+  void for_each_texel(Visit&& visit) const {
+    const double smallest = kSmallest * area_;
+    std::size_t i = 0;
+    for (int row = 0; row < rows_; ++row) {
+      for (int column = 0; column < columns_; ++column, ++i) {
+        if (weights_[i] > smallest) visit(left_ + column, top_ + row, weights_[i]);
+      }
+    }
+  }
+
+ private:
+  static constexpr double kSmallest = 1e-9;  // weight, a rounding error
+
+  // What a piece of an edge adds to all cells on its right.
+  struct Beside {
+    double height = 0.0;
+    double moment = 0.0;
+  };
+
+  void integrate_polygon(std::span<const glm::dvec2> corners);
+  void integrate_in_cell(std::span<const glm::dvec2> corners);
+  void add_edge(glm::dvec2 from, glm::dvec2 to);
+  void add_piece(int column, int row, glm::dvec2 from, glm::dvec2 to);
+  void add_moments(int column, int row, double area, double x, double y, double xy);
+
+  const std::span<const double> row_weights_;
+  std::vector<double> weights_;
+  std::vector<Beside> beside_;
+  int left_ = 0;
+  int top_ = 0;
+  int columns_ = 0;
+  int rows_ = 0;
+  double area_ = 0.0;
+};
+
+}  // namespace mirrorbake

@@ -1,7 +1,6 @@
 #include "bilinear_mean.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "coverage.hpp"
 
@@ -34,6 +33,68 @@ Polygon cut(const Polygon& from, int axis, double limit, double side) {
   return to;
 }
 
+// Integrals over the parts of a polygon in cells, edge by edge. By Green's theorem the integral of f is that of
+// F dy around the polygon, F(x, y) the integral of f from x to the right. Within the cell of a piece of an edge
+// that one ends at the cell's side; beyond, it is that of all of a cell's width.
+class EdgeWalk {
+ public:
+  EdgeWalk(BilinearMean::Cell* cells, int columns, int rows)
+      : cells_(cells), columns_(columns), rows_(rows) {}
+
+  void add_edge(glm::dvec2 from, glm::dvec2 to) {
+    if (from.y == to.y) return;
+    const bool down = from.y < to.y;
+    const double sign = down ? 1.0 : -1.0;
+    const glm::dvec2 a = down ? from : to;
+    const glm::dvec2 b = down ? to : from;
+    const double slope = (b.x - a.x) / (b.y - a.y);
+    glm::dvec2 p = a;
+    for (int row = static_cast<int>(a.y); p.y < b.y && row < rows_; ++row) {
+      const bool last = row + 1 >= b.y;
+      const glm::dvec2 end = last ? b : glm::dvec2(a.x + slope * (row + 1 - a.y), row + 1);
+      add_in_row(row, p, end, sign);
+      p = end;
+    }
+  }
+
+ private:
+  void add_in_row(int row, glm::dvec2 p, glm::dvec2 end, double sign) {
+    const int step = p.x < end.x ? 1 : -1;
+    int column = std::clamp(static_cast<int>(p.x), 0, columns_ - 1);
+    const double y_per_x = (end.y - p.y) / (end.x != p.x ? end.x - p.x : 1.0);
+    for (;;) {
+      const double side = step > 0 ? column + 1 : column;
+      const int next = column + step;
+      if (!(step > 0 ? end.x > side : end.x < side) || next < 0 || next == columns_) break;
+      const glm::dvec2 q(side, std::min(end.y, p.y + (side - p.x) * y_per_x));
+      add_piece(row, column, p, q, sign);
+      p = q;
+      column = next;
+    }
+    add_piece(row, column, p, end, sign);
+  }
+
+  void add_piece(int row, int column, glm::dvec2 from, glm::dvec2 to, double sign) {
+    const double dx = to.x - from.x;
+    const double dy = to.y - from.y;
+    const double x = 0.5 * (from.x + to.x) - column;
+    const double y = 0.5 * (from.y + to.y) - row;
+    const double x2 = 1.0 - x * x - dx * dx * (1.0 / 12.0);
+    const double height = sign * dy;
+    BilinearMean::Cell& cell = cells_[row * columns_ + column];
+    cell.area += height * (1.0 - x);
+    cell.x += 0.5 * height * x2;
+    cell.y += height * (y * (1.0 - x) - dx * dy * (1.0 / 12.0));
+    cell.xy += 0.5 * height * (y * x2 - x * dx * dy * (1.0 / 6.0));
+    cell.beside += height;
+    cell.beside_y += height * y;
+  }
+
+  BilinearMean::Cell* cells_;
+  int columns_;
+  int rows_;
+};
+
 }  // namespace
 
 void BilinearMean::integrate(const Quad& quad, glm::dvec2 low, glm::dvec2 high) {
@@ -62,21 +123,27 @@ void BilinearMean::integrate_polygon(std::span<const glm::dvec2> corners) {
   columns_ = floor_of(high.x - 0.5) - left_ + 2;
   rows_ = floor_of(high.y - 0.5) - top_ + 2;
   weights_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0.0);
-  if (columns_ == 2 && rows_ == 2) return integrate_in_cell(corners);
-  beside_.assign(weights_.size(), {});
-  // In texels from the centre of the first one.
-  const glm::dvec2 origin(left_ + 0.5, top_ + 0.5);
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    add_edge(corners[i] - origin, corners[i + 1 < corners.size() ? i + 1 : 0] - origin);
-  }
-  if (columns_ > 2) {
-    for (int row = 0; row + 1 < rows_; ++row) {
-      Beside sum;
-      for (int column = 1; column + 1 < columns_; ++column) {
-        const Beside& left = beside_[static_cast<std::size_t>(row * columns_ + column - 1)];
-        sum.height += left.height;
-        sum.moment += left.moment;
-        add_moments(column, row, sum.height, 0.5 * sum.height, sum.moment, 0.5 * sum.moment);
+  const int cell_columns = columns_ - 1;
+  const int cell_rows = rows_ - 1;
+  if (cell_columns == 1 && cell_rows == 1) {
+    add_cell(0, 0, cell_of(corners));
+  } else {
+    cells_.assign(static_cast<std::size_t>(cell_columns) * static_cast<std::size_t>(cell_rows), {});
+    // In texels from the centre of the first one.
+    const glm::dvec2 origin(left_ + 0.5, top_ + 0.5);
+    EdgeWalk walk(cells_.data(), cell_columns, cell_rows);
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      walk.add_edge(corners[i] - origin, corners[i + 1 < corners.size() ? i + 1 : 0] - origin);
+    }
+    const Cell* cell = cells_.data();
+    for (int row = 0; row < cell_rows; ++row) {
+      double height = 0.0;
+      double moment = 0.0;
+      for (int column = 0; column < cell_columns; ++column, ++cell) {
+        add_cell(column, row,
+                 {cell->area + height, cell->x + 0.5 * height, cell->y + moment, cell->xy + 0.5 * moment});
+        height += cell->beside;
+        moment += cell->beside_y;
       }
     }
   }
@@ -84,97 +151,43 @@ void BilinearMean::integrate_polygon(std::span<const glm::dvec2> corners) {
   if (area_ < 0.0) scale(-1.0);
 }
 
-// Moments about the first corner, by Green's theorem, which are then shifted to the corner of the cell.
-void BilinearMean::integrate_in_cell(std::span<const glm::dvec2> corners) {
-  double area = 0.0;
-  double x = 0.0;
-  double y = 0.0;
-  double xy = 0.0;
+// Moments about the first corner, which are then shifted to the corner of the cell.
+BilinearMean::Cell BilinearMean::cell_of(std::span<const glm::dvec2> corners) const {
+  Cell cell;
   glm::dvec2 a = corners[1] - corners[0];
   for (const glm::dvec2 corner : corners.subspan(2)) {
     const glm::dvec2 b = corner - corners[0];
     const double cross = a.x * b.y - b.x * a.y;
-    area += cross;
-    x += cross * (a.x + b.x);
-    y += cross * (a.y + b.y);
-    xy += cross * (a.x * (2.0 * a.y + b.y) + b.x * (a.y + 2.0 * b.y));
+    cell.area += cross;
+    cell.x += cross * (a.x + b.x);
+    cell.y += cross * (a.y + b.y);
+    cell.xy += cross * (a.x * (2.0 * a.y + b.y) + b.x * (a.y + 2.0 * b.y));
     a = b;
   }
-  area *= 0.5;
-  x *= 1.0 / 6.0;
-  y *= 1.0 / 6.0;
-  const double from_x = corners[0].x - 0.5 - left_;
-  const double from_y = corners[0].y - 0.5 - top_;
-  xy = xy * (1.0 / 24.0) + from_x * y + from_y * x + from_x * from_y * area;
-  add_moments(0, 0, area, x + from_x * area, y + from_y * area, xy);
-  if (area_ < 0.0) scale(-1.0);
+  cell.area *= 0.5;
+  cell.x *= 1.0 / 6.0;
+  cell.y *= 1.0 / 6.0;
+  const double x = corners[0].x - 0.5 - left_;
+  const double y = corners[0].y - 0.5 - top_;
+  cell.xy = cell.xy * (1.0 / 24.0) + x * cell.y + y * cell.x + x * y * cell.area;
+  cell.x += x * cell.area;
+  cell.y += y * cell.area;
+  return cell;
 }
 
-void BilinearMean::add_edge(glm::dvec2 from, glm::dvec2 to) {
-  if (from.y == to.y) return;
-  const bool down = from.y < to.y;
-  const glm::dvec2 a = down ? from : to;
-  const glm::dvec2 b = down ? to : from;
-  const double slope = (b.x - a.x) / (b.y - a.y);
-  glm::dvec2 p = a;
-  for (int row = static_cast<int>(a.y); p.y < b.y && row + 1 < rows_; ++row) {
-    const bool last = row + 1 >= b.y;
-    const glm::dvec2 end = last ? b : glm::dvec2(a.x + slope * (row + 1 - a.y), row + 1);
-    // Through the columns of this row.
-    const double step = p.x < end.x ? 1.0 : -1.0;
-    int column = std::clamp(static_cast<int>(p.x), 0, columns_ - 2);
-    while (p.y < end.y) {
-      const double side = step > 0.0 ? column + 1 : column;
-      const bool leaves = step > 0.0 ? end.x > side : end.x < side;
-      const int next = column + static_cast<int>(step);
-      glm::dvec2 q = end;
-      if (leaves && next >= 0 && next + 1 < columns_) q = {side, p.y + (side - p.x) / slope};
-      q.y = std::min(q.y, end.y);
-      if (down) {
-        add_piece(column, row, p, q);
-      } else {
-        add_piece(column, row, q, p);
-      }
-      if (q.x == end.x && q.y == end.y) break;
-      p = q;
-      column = next;
-    }
-    p = end;
-  }
-}
-
-// By Green's theorem the integral of f over a polygon is that of F dy around it, F(x, y) the integral of f from
-// x to the right. Within the cell of the piece that ends at the cell's side; beyond it, it is that of all
-// of the cell's width.
-void BilinearMean::add_piece(int column, int row, glm::dvec2 from, glm::dvec2 to) {
-  const double dx = to.x - from.x;
-  const double dy = to.y - from.y;
-  const double x = 0.5 * (from.x + to.x) - column;
-  const double y = 0.5 * (from.y + to.y) - row;
-  const double x2 = x * x + dx * dx / 12.0;
-  add_moments(column, row, dy * (1.0 - x), 0.5 * dy * (1.0 - x2), dy * (y * (1.0 - x) - dx * dy / 12.0),
-              0.5 * dy * (y * (1.0 - x2) - x * dx * dy / 6.0));
-  Beside& beside = beside_[static_cast<std::size_t>(row * columns_ + column)];
-  beside.height += dy;
-  beside.moment += dy * y;
-}
-
-void BilinearMean::add_moments(int column, int row, double area, double x, double y, double xy) {
+void BilinearMean::add_cell(int column, int row, const Cell& cell) {
+  double scale = 1.0;
   if (!row_weights_.empty()) {
     const int last = static_cast<int>(row_weights_.size()) - 1;
     const auto weight = [&](int i) { return row_weights_[static_cast<std::size_t>(std::clamp(i, 0, last))]; };
-    const double scale = 0.5 * (weight(top_ + row) + weight(top_ + row + 1));
-    area *= scale;
-    x *= scale;
-    y *= scale;
-    xy *= scale;
+    scale = 0.5 * (weight(top_ + row) + weight(top_ + row + 1));
   }
-  area_ += area;
+  area_ += scale * cell.area;
   double* w = weights_.data() + row * columns_ + column;
-  w[0] += area - x - y + xy;
-  w[1] += x - xy;
-  w[columns_] += y - xy;
-  w[columns_ + 1] += xy;
+  w[0] += scale * (cell.area - cell.x - cell.y + cell.xy);
+  w[1] += scale * (cell.x - cell.xy);
+  w[columns_] += scale * (cell.y - cell.xy);
+  w[columns_ + 1] += scale * cell.xy;
 }
 
 }  // namespace mirrorbake

@@ -21,6 +21,17 @@ using Quad = std::array<glm::dvec2, 4>;
 /// mean of its rows: long images of texels around a pole need it.
 class BilinearMean {
  public:
+  /// Of the part of a polygon in a cell: integrals of 1, u, v and uv, and what its edges add to those of 1 and v in
+  /// the cells on their right.
+  struct Cell {
+    double area = 0.0;
+    double x = 0.0;
+    double y = 0.0;
+    double xy = 0.0;
+    double beside = 0.0;
+    double beside_y = 0.0;
+  };
+
   /// `row_weights`: solid angles of texels by row, which are referred to, or none if they are all alike.
   explicit BilinearMean(std::span<const double> row_weights) : row_weights_(row_weights) {}
 
@@ -64,21 +75,13 @@ class BilinearMean {
  private:
   static constexpr double kSmallest = 1e-9;  // weight, a rounding error
 
-  // What a piece of an edge adds to all cells on its right.
-  struct Beside {
-    double height = 0.0;
-    double moment = 0.0;
-  };
-
   void integrate_polygon(std::span<const glm::dvec2> corners);
-  void integrate_in_cell(std::span<const glm::dvec2> corners);
-  void add_edge(glm::dvec2 from, glm::dvec2 to);
-  void add_piece(int column, int row, glm::dvec2 from, glm::dvec2 to);
-  void add_moments(int column, int row, double area, double x, double y, double xy);
+  Cell cell_of(std::span<const glm::dvec2> corners) const;
+  void add_cell(int column, int row, const Cell& cell);
 
   const std::span<const double> row_weights_;
   std::vector<double> weights_;
-  std::vector<Beside> beside_;
+  std::vector<Cell> cells_;
   int left_ = 0;
   int top_ = 0;
   int columns_ = 0;

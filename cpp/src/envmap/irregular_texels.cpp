@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
-#include <tuple>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -182,10 +182,15 @@ void IrregularTexels::add(const TexelPlace& texel, double weight) {
 
 void IrregularTexels::merge(std::vector<Tap>& taps) {
   // Down to the weight, so that the order of equal texels does not depend on the library.
-  const auto key = [](const Tap& tap) {
-    return std::tie(tap.texel.face, tap.texel.row, tap.texel.column, tap.weight);
+  const auto number = [](const TexelPlace& texel) {
+    return (static_cast<std::uint64_t>(texel.face) << 34U) + (static_cast<std::uint64_t>(texel.row) << 17U) +
+           static_cast<std::uint64_t>(texel.column);
   };
-  std::sort(taps.begin(), taps.end(), [&](const Tap& a, const Tap& b) { return key(a) < key(b); });
+  std::sort(taps.begin(), taps.end(), [&](const Tap& a, const Tap& b) {
+    const std::uint64_t first = number(a.texel);
+    const std::uint64_t second = number(b.texel);
+    return first != second ? first < second : a.weight < b.weight;
+  });
   std::size_t count = 0;
   for (const Tap& tap : taps) {
     if (count > 0 && taps[count - 1].texel == tap.texel) {

@@ -214,33 +214,32 @@ Hit RayScene::View::intersect(const Ray& ray, RayKind kind) const {
 }
 
 void RayScene::View::intersect_packet(std::span<const Ray> rays, Hit* hits, RayKind kind) const {
+  RayPacket packet;
+  for (std::size_t i = 0; i < rays.size(); ++i) packet.set(i, rays[i]);
+  intersect(packet, rays.size(), kind, true);
+  for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = packet.hit(i);
+}
+
+void RayScene::View::intersect(RayPacket& packet, std::size_t count, RayKind kind, bool alike) const {
   const Visible& visible = visible_to(kind);
-  alignas(64) RTCRayHit16 query;
+  RTCRayHit16& query = packet.query_;
+  if (!alike) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Hit hit = intersect(packet.ray(i), kind);
+      query.ray.tfar[i] = hit.distance;
+      query.hit.geomID[i] = hit.geometry;
+      query.hit.primID[i] = hit.triangle;
+      query.hit.u[i] = hit.u;
+      query.hit.v[i] = hit.v;
+    }
+    return;
+  }
   alignas(64) int valid[kPacketSize];
   for (std::size_t i = 0; i < kPacketSize; ++i) {
-    valid[i] = i < rays.size() ? -1 : 0;
-    const Ray& ray = rays[std::min(i, rays.size() - 1)];
-    query.ray.org_x[i] = ray.origin.x;
-    query.ray.org_y[i] = ray.origin.y;
-    query.ray.org_z[i] = ray.origin.z;
-    query.ray.tnear[i] = 0.0F;
-    query.ray.dir_x[i] = ray.direction.x;
-    query.ray.dir_y[i] = ray.direction.y;
-    query.ray.dir_z[i] = ray.direction.z;
-    query.ray.time[i] = 0.0F;
-    query.ray.tfar[i] = ray.max_distance;
+    valid[i] = i < count ? -1 : 0;
     query.ray.mask[i] = visible.mask;
-    query.ray.id[i] = 0;
-    query.ray.flags[i] = 0;
-    query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-    query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
   intersect16(valid, visible.scene, query);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    hits[i] = {};
-    if (query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-    hits[i] = {query.ray.tfar[i], query.hit.geomID[i], query.hit.primID[i], query.hit.u[i], query.hit.v[i]};
-  }
 }
 
 bool RayScene::View::occluded(const Ray& ray) const {

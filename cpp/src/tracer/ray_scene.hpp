@@ -37,6 +37,49 @@ struct Hit {
   bool missed() const { return geometry == kNoGeometry; }
 };
 
+/// Rays in the form in which Embree takes and answers them.
+class RayPacket {
+ public:
+  RayPacket() {
+    for (std::size_t i = 0; i < kPacketSize; ++i) {
+      set(i, {});
+      query_.ray.tnear[i] = 0.0F;
+      query_.ray.time[i] = 0.0F;
+      query_.ray.id[i] = 0;
+      query_.ray.flags[i] = 0;
+      query_.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+  }
+
+  void set(std::size_t i, const Ray& ray) {
+    query_.ray.org_x[i] = ray.origin.x;
+    query_.ray.org_y[i] = ray.origin.y;
+    query_.ray.org_z[i] = ray.origin.z;
+    query_.ray.dir_x[i] = ray.direction.x;
+    query_.ray.dir_y[i] = ray.direction.y;
+    query_.ray.dir_z[i] = ray.direction.z;
+    query_.ray.tfar[i] = ray.max_distance;
+    query_.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+  }
+
+  /// Origin and direction.
+  Ray ray(std::size_t i) const {
+    return {{query_.ray.org_x[i], query_.ray.org_y[i], query_.ray.org_z[i]},
+            {query_.ray.dir_x[i], query_.ray.dir_y[i], query_.ray.dir_z[i]}};
+  }
+  std::uint32_t geometry(std::size_t i) const { return query_.hit.geomID[i]; }
+  /// That of the hit; the ray's own, for a miss.
+  float distance(std::size_t i) const { return query_.ray.tfar[i]; }
+  Hit hit(std::size_t i) const {
+    if (geometry(i) == kNoGeometry) return {};
+    return {distance(i), geometry(i), query_.hit.primID[i], query_.hit.u[i], query_.hit.v[i]};
+  }
+
+ private:
+  friend class RayScene;
+  alignas(64) RTCRayHit16 query_;
+};
+
 /// The scene in Embree: one geometry per object, then one per rectangle light and per sphere light.
 /// Coordinates are relative to `origin`, so that a scene far from the world's origin is traced with the
 /// precision of one close to it.
@@ -51,6 +94,8 @@ class RayScene {
     Hit intersect(const Ray& ray, RayKind kind) const;
     /// Closest hits of up to kPacketSize rays that resemble each other: several times faster than one by one.
     void intersect_packet(std::span<const Ray> rays, Hit* hits, RayKind kind) const;
+    /// The same for the packet's first `count` rays, together if they are `alike`, else one by one.
+    void intersect(RayPacket& packet, std::size_t count, RayKind kind, bool alike) const;
     /// Whether a shadow ray meets anything.
     bool occluded(const Ray& ray) const;
 

@@ -55,16 +55,13 @@ void check_rays(std::span<const glm::vec3> origins, std::span<const glm::vec3> d
   }
 }
 
-/// Ray number `i`, its direction made a unit vector. Throws InvalidArgument if it is not usable.
+/// Ray number `i` with all checks, its direction made a unit vector. Throws InvalidArgument if it is not usable.
 Ray checked_ray(glm::vec3 origin, glm::vec3 direction, std::size_t i, glm::vec3 scene_origin) {
-  const float square = glm::dot(direction, direction);
   if (!usable(origin)) {
     throw InvalidArgument("origins[" + std::to_string(i) + "]", text(origin),
                           "finite coordinates up to 1e18");
   }
-  if (square > 1e-20F && square < 1e20F)
-    return {origin - scene_origin, direction * (1.0F / std::sqrt(square))};
-  // The square of anything else loses digits in float.
+  // The squares of very short and very long vectors lose digits in float.
   const double length = glm::length(glm::dvec3(direction));
   if (!std::isfinite(length) || length == 0.0) {
     throw InvalidArgument("directions[" + std::to_string(i) + "]", text(direction),
@@ -73,47 +70,77 @@ Ray checked_ray(glm::vec3 origin, glm::vec3 direction, std::size_t i, glm::vec3 
   return {origin - scene_origin, glm::vec3(glm::dvec3(direction) / length)};
 }
 
-/// Closest hits of any rays, in packets where neighbours resemble each other.
-void intersect_many(const tracing::RayScene::View& view, std::span<const Ray> rays, Hit* hits,
-                    float scene_radius) {
-  // Packets take rays through the same nodes: worth it if they start close together and keep together.
-  constexpr float kAlike = 0.9F;
-  const float near = 0.05F * scene_radius;
-  for (std::size_t i = 0; i < rays.size(); i += tracing::kPacketSize) {
-    const auto packet = rays.subspan(i, std::min(tracing::kPacketSize, rays.size() - i));
-    // A look at every fifth will do.
-    bool is_alike = true;
-    for (std::size_t k = 5; k < packet.size(); k += 5) {
-      const glm::vec3 apart = packet[k].origin - packet[0].origin;
-      is_alike = is_alike && glm::dot(packet[k].direction, packet[0].direction) > kAlike &&
-                 glm::dot(apart, apart) < near * near;
-    }
-    if (is_alike) {
-      view.intersect_packet(packet, hits + i, RayKind::camera);
-    } else {
-      for (std::size_t k = 0; k < packet.size(); ++k)
-        hits[i + k] = view.intersect(packet[k], RayKind::camera);
-    }
-  }
-}
+/// Rays straight from the caller's arrays to Embree's packet and their hits back.
+class RayBatch {
+ public:
+  RayBatch(const tracing::RayScene& scene, const tracing::RayScene::View& view)
+      : view_(view), origin_(scene.origin()), near_(0.05F * scene.radius()) {}
 
-/// Calls `record(first, rays, hits)` for chunks of the rays, in parallel.
+  /// Traces rays `first` … of the arrays, up to a packet of them. Returns how many.
+  std::size_t trace(std::span<const glm::vec3> origins, std::span<const glm::vec3> directions,
+                    std::size_t first) {
+    count_ = std::min(tracing::kPacketSize, origins.size() - first);
+    if (!load(&origins[first], &directions[first])) {
+      for (std::size_t i = 0; i < count_; ++i)
+        packet_.set(i, checked_ray(origins[first + i], directions[first + i], first + i, origin_));
+    }
+    view_.intersect(packet_, count_, RayKind::camera, are_alike());
+    return count_;
+  }
+
+  const tracing::RayPacket& packet() const { return packet_; }
+
+ private:
+  // The common case, without a branch. False if any ray needs a closer look.
+  bool load(const glm::vec3* origins, const glm::vec3* directions) {
+    bool ordinary = true;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const glm::vec3 o = origins[i];
+      const glm::vec3 d = directions[i];
+      const float square = glm::dot(d, d);
+      const float scale = 1.0F / std::sqrt(square);
+      packet_.set(i, {o - origin_, d * scale});
+      const float largest = std::max(std::abs(o.x), std::max(std::abs(o.y), std::abs(o.z)));
+      const float sum = std::abs(o.x) + std::abs(o.y) + std::abs(o.z);  // NaN if any is
+      ordinary =
+          ordinary & (largest <= kLargestCoordinate) & (sum >= 0.0F) & (square > 1e-20F) & (square < 1e20F);
+    }
+    return ordinary;
+  }
+
+  // Packets take rays through the same nodes: worth it if they start close together and keep together. A look at
+  // every fifth will do.
+  bool are_alike() const {
+    constexpr float kAlike = 0.9F;
+    const Ray start = packet_.ray(0);
+    for (std::size_t k = 5; k < count_; k += 5) {
+      const Ray other = packet_.ray(k);
+      const glm::vec3 apart = other.origin - start.origin;
+      if (!(glm::dot(other.direction, start.direction) > kAlike && glm::dot(apart, apart) < near_ * near_))
+        return false;
+    }
+    return true;
+  }
+
+  const tracing::RayScene::View& view_;
+  glm::vec3 origin_;
+  float near_;
+  std::size_t count_ = 0;
+  tracing::RayPacket packet_;
+};
+
+/// Calls `record(first, count, packet)` for packets of the rays, in parallel.
 template <typename Record>
 void for_each_hit(const tracing::World& world, std::span<const glm::vec3> origins,
                   std::span<const glm::vec3> directions, std::span<const int> hidden, const Record& record) {
   check_rays(origins, directions);
   const tracing::RayScene::View view = world.rays.without(hidden);
-  constexpr std::size_t kChunk = 256;
-  parallel_for(origins.size(), 16 * kChunk, [&](std::size_t begin, std::size_t end) {
-    std::array<Ray, kChunk> rays;
-    std::array<Hit, kChunk> hits;
-    for (std::size_t first = begin; first < end; first += kChunk) {
-      const std::size_t count = std::min(kChunk, end - first);
-      for (std::size_t i = 0; i < count; ++i) {
-        rays[i] = checked_ray(origins[first + i], directions[first + i], first + i, world.rays.origin());
-      }
-      intersect_many(view, {rays.data(), count}, hits.data(), world.rays.radius());
-      record(first, std::span<const Ray>(rays.data(), count), hits.data());
+  parallel_for(origins.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    RayBatch batch(world.rays, view);
+    for (std::size_t first = begin; first < end;) {
+      const std::size_t count = batch.trace(origins.first(end), directions, first);
+      record(first, count, batch.packet());
+      first += count;
     }
   });
 }
@@ -260,13 +287,13 @@ std::vector<RayHit> Tracer::intersect(std::span<const glm::vec3> origins,
   const tracing::World& world = state_->world;
   std::vector<RayHit> hits(origins.size());
   for_each_hit(world, origins, directions, hidden,
-               [&](std::size_t first, std::span<const Ray> rays, const Hit* found) {
-                 for (std::size_t i = 0; i < rays.size(); ++i) {
-                   const Hit& hit = found[i];
+               [&](std::size_t first, std::size_t count, const tracing::RayPacket& packet) {
+                 for (std::size_t i = 0; i < count; ++i) {
+                   const Hit hit = packet.hit(i);
                    if (hit.missed()) continue;
                    RayHit& out = hits[first + i];
                    out.distance = hit.distance;
-                   out.normal = world.geometric_normal(rays[i], hit);
+                   out.normal = world.geometric_normal(packet.ray(i), hit);
                    if (!world.is_light(hit)) out.object = static_cast<int>(hit.geometry);
                  }
                });
@@ -284,13 +311,15 @@ void Tracer::intersect(std::span<const glm::vec3> origins, std::span<const glm::
     }
   }
   const tracing::World& world = state_->world;
+  const auto objects = static_cast<std::uint32_t>(world.scene.objects.size());
   for_each_hit(world, origins, directions, hidden,
-               [&](std::size_t first, std::span<const Ray> rays, const Hit* found) {
-                 for (std::size_t i = 0; i < rays.size(); ++i) {
-                   distance[first + i] = found[i].distance;
-                   object[first + i] = found[i].missed() || world.is_light(found[i])
-                                           ? -1
-                                           : static_cast<int>(found[i].geometry);
+               [&](std::size_t first, std::size_t count, const tracing::RayPacket& packet) {
+                 float* to_distance = &distance[first];
+                 std::int32_t* to_object = &object[first];
+                 for (std::size_t i = 0; i < count; ++i) {
+                   const std::uint32_t geometry = packet.geometry(i);
+                   to_distance[i] = packet.distance(i);
+                   to_object[i] = geometry < objects ? static_cast<std::int32_t>(geometry) : -1;
                  }
                });
 }

@@ -10,7 +10,45 @@
 
 #include "mirrorbake/core/error.hpp"
 
+#ifdef MIRRORBAKE_THREAD_SANITIZER
+#include <sanitizer/tsan_interface.h>
+#endif
+
 namespace mirrorbake {
+namespace {
+
+// The threading library is not built with the thread sanitizer, and this file is not either, lest the
+// library's inline functions look like races. The sanitizer has to be told that chunks run after the start of
+// their loop and before its end.
+void release([[maybe_unused]] char* token) {
+#ifdef MIRRORBAKE_THREAD_SANITIZER
+  __tsan_release(token);
+#endif
+}
+void acquire([[maybe_unused]] char* token) {
+#ifdef MIRRORBAKE_THREAD_SANITIZER
+  __tsan_acquire(token);
+#endif
+}
+
+struct Loop {
+  char start = 0;
+  char end = 0;
+  Loop() { release(&start); }
+  ~Loop() { acquire(&end); }
+  Loop(const Loop&) = delete;
+  Loop& operator=(const Loop&) = delete;
+};
+
+struct Chunk {
+  Loop& loop;
+  explicit Chunk(Loop& l) : loop(l) { acquire(&loop.start); }
+  ~Chunk() { release(&loop.end); }
+  Chunk(const Chunk&) = delete;
+  Chunk& operator=(const Chunk&) = delete;
+};
+
+}  // namespace
 
 struct ThreadLimit::State {
   explicit State(std::size_t threads) : control(tbb::global_control::max_allowed_parallelism, threads) {}
@@ -38,8 +76,11 @@ void parallel_for(std::size_t count, std::size_t grain,
   const std::size_t chunks = (count + grain - 1) / grain;
   if (chunks == 0) return;
   if (chunks == 1) return body(0, count);
-  tbb::parallel_for(std::size_t{0}, chunks,
-                    [&](std::size_t chunk) { body(chunk * grain, std::min(count, (chunk + 1) * grain)); });
+  Loop loop;
+  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t index) {
+    const Chunk chunk(loop);
+    body(index * grain, std::min(count, (index + 1) * grain));
+  });
 }
 
 double parallel_sum(std::size_t count, std::size_t grain,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -82,7 +82,7 @@ def bake(
     _check_output(directory, source)
     total = config.views.count
     report(0, total, "preparing the scene")
-    stage = stage or prepare_stage(config)
+    stage = replace(stage or prepare_stage(config), config=config)
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as failure:

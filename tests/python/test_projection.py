@@ -24,6 +24,19 @@ def test_directions_survive_a_round_trip_within_2e_7_radians(name: str, directio
     assert np.all(angle <= 2e-7)
 
 
+@settings(max_examples=200, deadline=None)
+@given(directions=hnp.arrays(np.float32, (8, 3), elements=COMPONENT))
+def test_directions_survive_a_sphere_map_as_far_as_its_rim_lets_them(directions: np.ndarray) -> None:
+    directions = directions[np.any(directions != 0, axis=1)]
+    faces, points = pr.points_from_directions("sphere_map", directions)
+    again = pr.directions_from_points("sphere_map", faces, points).astype(np.float64)
+    exact = directions.astype(np.float64)
+    angle = np.arctan2(np.linalg.norm(np.cross(exact, again), axis=1), np.sum(exact * again, axis=1))
+    # r = sin(θ/2) in float32, off by δ = 1e-7, moves θ by 2δ/cos(θ/2), at the rim by √(8δ).
+    half = np.arctan2(np.hypot(exact[:, 0], exact[:, 1]), exact[:, 2]) / 2
+    assert np.all(angle <= np.minimum(2e-7 + 2e-7 / np.maximum(np.cos(half), 1e-12), 1e-3))
+
+
 @pytest.mark.parametrize("bad", [[0, 0, 0], [np.nan, 0, 1], [np.inf, 0, 0]])
 @pytest.mark.parametrize("name", [*PROJECTIONS, "sphere_map", "fisheye:90"])
 def test_directions_without_an_answer_are_errors(name: str, bad: list[float]) -> None:

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/envmap/texel_lookup.hpp"
+#include "resample_kernels.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -181,6 +183,75 @@ struct Sampler {
   }
 };
 
+// Whether ResampleKernels has a loop for the positions of directions.
+bool has_position_kernel(ProjectionKind kind) {
+  return kind == ProjectionKind::latlong || kind == ProjectionKind::cube ||
+         kind == ProjectionKind::dual_paraboloid;
+}
+
+// Bilinear lookups in the finest level, whose positions come from a vectorised loop. Returns the number of
+// directions that are not finite or zero.
+std::size_t sample_bilinear(const EnvMapView& map, std::span<const glm::vec3> directions,
+                            std::span<float> values) {
+  const EnvMapLayout& layout = map.layout;
+  const std::size_t count = directions.size();
+  const std::size_t channels = static_cast<std::size_t>(layout.channels);
+  std::vector<double> components(3 * count);
+  double* dx = components.data();
+  double* dy = dx + count;
+  double* dz = dy + count;
+  std::vector<std::uint8_t> usable(count);
+  std::size_t unusable = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 d(directions[i]);
+    const double size = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
+    usable[i] = size > 0.0 && std::isfinite(size) ? 1 : 0;
+    unusable += usable[i] ? 0 : 1;
+    dx[i] = usable[i] ? d.x : 0.0;
+    dy[i] = usable[i] ? d.y : 0.0;
+    dz[i] = usable[i] ? d.z : 1.0;
+  }
+  std::vector<double> x(count);
+  std::vector<double> y(count);
+  std::vector<std::int32_t> face(count);
+  const ResampleKernels& kernels = resample_kernels();
+  const auto find = layout.projection.kind == ProjectionKind::latlong ? kernels.latlong_positions
+                    : layout.projection.kind == ProjectionKind::cube  ? kernels.cube_positions
+                                                                      : kernels.dual_paraboloid_positions;
+  find(dx, dy, dz, count, layout.width, layout.height, {x.data(), y.data(), face.data()});
+
+  const std::size_t line = static_cast<std::size_t>(layout.width) * channels;
+  const std::size_t face_values = line * static_cast<std::size_t>(layout.height);
+  std::vector<double> value(channels);
+  for (std::size_t i = 0; i < count; ++i) {
+    float* result = values.data() + i * channels;
+    if (!usable[i]) {
+      std::fill_n(result, channels, 0.0F);
+      continue;
+    }
+    const double column = x[i] - 0.5;
+    const double row = y[i] - 0.5;
+    if (column < 0.0 || row < 0.0 || column >= layout.width - 1 || row >= layout.height - 1) {
+      interpolate(map, 0, face[i], x[i], y[i], value);
+      for (std::size_t c = 0; c < channels; ++c) result[c] = static_cast<float>(value[c]);
+      continue;
+    }
+    const int left = static_cast<int>(column);
+    const int top = static_cast<int>(row);
+    const double fx = column - left;
+    const double fy = row - top;
+    const float* a = map.values.data() + static_cast<std::size_t>(face[i]) * face_values +
+                     static_cast<std::size_t>(top) * line + static_cast<std::size_t>(left) * channels;
+    const float* b = a + line;
+    for (std::size_t c = 0; c < channels; ++c) {
+      const double above = (1.0 - fx) * static_cast<double>(a[c]) + fx * static_cast<double>(a[c + channels]);
+      const double below = (1.0 - fx) * static_cast<double>(b[c]) + fx * static_cast<double>(b[c + channels]);
+      result[c] = static_cast<float>((1.0 - fy) * above + fy * below);
+    }
+  }
+  return unusable;
+}
+
 }  // namespace
 
 SampleFilter parse_sample_filter(std::string_view name) {
@@ -210,7 +281,14 @@ std::size_t sample(const EnvMapView& map, std::span<const glm::vec3> directions,
     throw InvalidArgument("max_anisotropy", std::to_string(options.max_anisotropy), "at least 1");
   }
   std::atomic<std::size_t> unusable{0};
+  const bool vectorised =
+      options.filter == SampleFilter::bilinear && has_position_kernel(map.layout.projection.kind);
   parallel_for(directions.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    if (vectorised) {
+      unusable += sample_bilinear(map, directions.subspan(begin, end - begin),
+                                  values.subspan(begin * channels, (end - begin) * channels));
+      return;
+    }
     Sampler sampler(map, options);
     for (std::size_t i = begin; i < end; ++i) {
       const glm::dvec3 d(directions[i]);

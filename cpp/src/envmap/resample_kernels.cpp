@@ -225,7 +225,7 @@ typedef double FourDoubles __attribute__((vector_size(32)));
 
 inline FourFloats load(const float* from) { return *reinterpret_cast<const FourAnywhere*>(from); }
 
-// Several values of a texel side by side. `kStride` 0: known at run time only.
+// Several values of a texel side by side.
 template <int kValues>
 struct Lanes;
 
@@ -245,7 +245,7 @@ struct Lanes<4> {
   typedef FourDoubles Doubles;
   static Floats read(const float* from) { return load(from); }
   static Doubles widen(Floats v) { return __builtin_convertvector(v, FourDoubles); }
-  static Floats narrow(Doubles v) { return __builtin_convertvector(v, FourFloats); }
+  static Floats narrow(const Doubles& v) { return __builtin_convertvector(v, FourFloats); }
   static void write(float* to, Floats v) { *reinterpret_cast<FourAnywhere*>(to) = v; }
 };
 
@@ -259,6 +259,7 @@ struct Lanes<3> : Lanes<4> {
   }
 };
 
+// `kStride` 0 and `kTaps` 0: known at run time only.
 template <int kValues, int kStride, std::uint32_t kTaps>
 void apply_group(const float* __restrict values, std::size_t stride_, const std::uint32_t* __restrict taps,
                  const float* __restrict weights, TapGroup group, const std::uint32_t* __restrict targets,

@@ -69,15 +69,27 @@ std::vector<double> integrate(const EnvMapView& map, int level) {
   if (level < 0 || level >= map.layout.levels) {
     throw InvalidArgument("level", std::to_string(level), "0 to " + std::to_string(map.layout.levels - 1));
   }
-  const std::vector<double> angles = texel_solid_angles(map.layout.projection, map.layout.level_width(level),
-                                                        map.layout.level_height(level));
+  const int width = map.layout.level_width(level);
+  const int height = map.layout.level_height(level);
+  // A table of a wide panorama would take more memory than its values.
+  const bool rows_alike = map.layout.projection.kind == ProjectionKind::latlong;
+  std::vector<double> angles;
+  if (!rows_alike) angles = texel_solid_angles(map.layout.projection, width, height);
   const std::span<const float> values = map.level(level);
   const std::size_t channels = static_cast<std::size_t>(map.layout.channels);
   std::vector<double> sums(channels);
-  for (std::size_t i = 0; i * channels < values.size(); ++i) {
-    const double angle = angles[i % angles.size()];
-    for (std::size_t c = 0; c < channels; ++c)
-      sums[c] += angle * static_cast<double>(values[i * channels + c]);
+  const float* value = values.data();
+  for (int face = 0; face < face_count(map.layout.projection); ++face) {
+    for (int row = 0; row < height; ++row) {
+      const double of_row =
+          rows_alike ? texel_solid_angle(map.layout.projection, width, height, 0, row) : 0.0;
+      const double* of_texels =
+          rows_alike ? nullptr : angles.data() + static_cast<std::ptrdiff_t>(row) * width;
+      for (int column = 0; column < width; ++column, value += channels) {
+        const double angle = rows_alike ? of_row : of_texels[column];
+        for (std::size_t c = 0; c < channels; ++c) sums[c] += angle * static_cast<double>(value[c]);
+      }
+    }
   }
   return sums;
 }

@@ -74,12 +74,15 @@ inline double hemisphere_exit(const Vec& p, const Vec& d) {
   return d.y < 0 && floor < sphere ? floor : sphere;
 }
 
-/// Rotates and scales into the shape's own coordinates. The aligned version leaves out products with zeros, which
-/// changes no bit of the result but the sign of a zero, to which the formulas are indifferent.
-template <bool rotated>
+/// Rotates and scales into the shape's own coordinates; boxes are not scaled. The aligned version leaves out products
+/// with zeros and ones, which changes no bit of the result but the sign of a zero, to which the formulas are
+/// indifferent.
+template <LookupShape shape, bool rotated>
 inline Vec local_direction(const LookupConstants& k, const Vec& d) {
   if constexpr (rotated) {
     return {dot(vec(k.rows), d), dot(vec(k.rows + 3), d), dot(vec(k.rows + 6), d)};
+  } else if constexpr (shape == LookupShape::box) {
+    return d;
   } else {
     return {k.rows[0] * d.x, k.rows[4] * d.y, k.rows[8] * d.z};
   }
@@ -90,8 +93,8 @@ inline Vec lookup(const LookupConstants& k, const Vec& p, const Vec& d) {
   if constexpr (shape == LookupShape::infinite) {
     return d;
   } else {
-    const Vec local_p = local_direction<rotated>(k, p - vec(k.centre));
-    const Vec local_d = local_direction<rotated>(k, d);
+    const Vec local_p = local_direction<shape, rotated>(k, p - vec(k.centre));
+    const Vec local_d = local_direction<shape, rotated>(k, d);
     double t = 0;
     if constexpr (shape == LookupShape::box) t = box_exit(local_p, local_d, vec(k.extent));
     if constexpr (shape == LookupShape::ellipsoid) t = sphere_exit(local_p, local_d);

@@ -39,6 +39,13 @@ template <typename T>
 inline bool all_finite(const Block<T>& a, const Block<T>& b, std::size_t count) {
   unsigned bad = 0;
   for (std::size_t i = 0; i < count; ++i) {
+    const T sum = (a.x[i] + a.y[i] + a.z[i]) + (b.x[i] + b.y[i] + b.z[i]);
+    bad |= sum * T(0) == T(0) ? 0U : 1U;
+  }
+  if (bad == 0) return true;
+  // The sum of finite values may be infinite.
+  bad = 0;
+  for (std::size_t i = 0; i < count; ++i) {
     const T sum =
         a.x[i] * T(0) + a.y[i] * T(0) + a.z[i] * T(0) + b.x[i] * T(0) + b.y[i] * T(0) + b.z[i] * T(0);
     bad |= sum == T(0) ? 0U : 1U;

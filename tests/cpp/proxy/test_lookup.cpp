@@ -393,6 +393,14 @@ TEST(Lookup, BatchNamesTheFirstRowThatIsNotFiniteInAnyArrayAndPrecision) {
   EXPECT_THAT(message_of([&] { mirror_lookups(box, {inf, 0, 0}, {}, {}, {}); }), testing::StartsWith("eye"));
 }
 
+TEST(Lookup, BatchTakesFiniteValuesWhoseSumIsNot) {
+  const std::vector<glm::vec3> directions(300, glm::vec3(3e38F, 3e38F, 1.0F));
+  const std::vector<glm::vec3> positions(directions.size(), glm::vec3(0.0F));
+  std::vector<glm::vec3> lookups(directions.size(), glm::vec3(-1.0F));
+  lookup_directions(Proxy{}, positions, directions, lookups);
+  EXPECT_EQ(lookups, directions);
+}
+
 TEST(Lookup, MirrorsRejectSpansOfDifferentLength) {
   std::vector<glm::vec3> two(2), three(3);
   EXPECT_THROW(mirror_lookups(Proxy{Box{}, {}}, {0, 0, 0}, two, three, three), InvalidArgument);

@@ -61,6 +61,14 @@ int bin_of(glm::vec2 point) {
   return y * kSide + x;
 }
 
+// A bit for each of 8 × 8 squares of bins. Few are lit: a look at them mostly spares the look at the bins, which are in
+// no cache.
+std::uint64_t square_bit(int bin) {
+  constexpr int kSquare = kSide / 8;
+  static_assert(kSide % 8 == 0);
+  return std::uint64_t{1} << (bin / kSide / kSquare * 8 + bin % kSide / kSquare);
+}
+
 }  // namespace
 
 // The specular surfaces as one distribution of triangles by area.
@@ -225,7 +233,7 @@ void CausticGuide::fill(const std::vector<Photon>& photons, double irradiance_of
     const auto share = static_cast<float>(kLargestShare * irradiance / (irradiance + noticeable));
     if (share < kLeastShare) continue;
 
-    grid_[c] = {share, static_cast<std::uint32_t>(first_.size() - 1)};
+    grid_[c] = {share, static_cast<std::uint32_t>(first_.size() - 1), 0};
     std::vector<double> powers;
     for (std::size_t word = 0; word < kWords; ++word) {
       LitBins lit;
@@ -233,6 +241,7 @@ void CausticGuide::fill(const std::vector<Photon>& photons, double irradiance_of
       for (std::size_t bin = 64 * word; bin < 64 * word + 64; ++bin) {
         if (!(histogram[bin] > 0.0F)) continue;
         lit.bits |= std::uint64_t{1} << (bin % 64);
+        grid_[c].lit_squares |= square_bit(static_cast<int>(bin));
         powers.push_back(static_cast<double>(histogram[bin]));
         bins_.push_back(static_cast<std::uint16_t>(bin));
       }
@@ -265,7 +274,9 @@ glm::vec3 CausticGuide::sample(Cell cell, glm::vec2 u) const {
 
 float CausticGuide::pdf(Cell cell, glm::vec3 direction) const {
   const Octahedral o = octahedral(direction);
-  const auto bin = static_cast<std::size_t>(bin_of(o.point));
+  const int number = bin_of(o.point);
+  if ((cell.lit_squares & square_bit(number)) == 0) return 0.0F;
+  const auto bin = static_cast<std::size_t>(number);
   const LitBins& lit = lit_[cell.number * kWords + bin / 64];
   const std::uint64_t bit = std::uint64_t{1} << (bin % 64);
   if ((lit.bits & bit) == 0) return 0.0F;

@@ -33,9 +33,10 @@ class CausticGuide {
 
   /// What is known of one place.
   struct Cell {
-    float share =
-        0.0F;  ///< of the samples that should follow the guide, in [0,1); 0: there is nothing to find
-    std::uint32_t number = 0;  ///< among the cells with a share
+    /// Of the samples that should follow the guide, in [0,1); 0: there is nothing to find.
+    float share = 0.0F;
+    std::uint32_t number = 0;       ///< among the cells with a share
+    std::uint64_t lit_squares = 0;  ///< which of 8 × 8 squares of bins light arrives from
   };
   Cell cell(glm::vec3 position) const {
     const glm::vec3 place = (position - corner_) * cells_per_metre_;

@@ -26,6 +26,7 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
+from benchmarks._build import built_program
 from benchmarks._report import Case, require, run, seconds
 from mirrorbake.envmap import EnvMap, Resampler
 from mirrorbake.projection import directions_from_points, points_from_directions, texel_directions
@@ -34,7 +35,6 @@ FloatArray = NDArray[np.float32]
 Convert = Callable[[], FloatArray]
 PLACES = 24
 SUBSET = 32  # rows of each face that the reference looks at
-ROOT = Path(__file__).parents[1]
 
 
 def optional(name: str, package: str) -> ModuleType | None:
@@ -361,23 +361,10 @@ def lookups() -> Iterator[Case]:
         )
 
 
-def our_tool() -> str | None:
-    folders = [Path(os.environ.get("MIRRORBAKE_TOOLS", "-")), *(ROOT / "build").glob("*/cpp/tools")]
-    found = [folder / "mb-envmap" for folder in folders if (folder / "mb-envmap").is_file()]
-    if not found:
-        print(
-            "bench: mb-envmap is not built: cmake --build --preset release --target mb-envmap",
-            file=sys.stderr,
-        )
-        return None
-    return str(max(found, key=lambda path: path.stat().st_mtime))
-
-
 def file_to_file() -> Iterator[Case]:
     """One process each, from an EXR file to EXR files."""
-    tool, maketx, oiiotool = our_tool(), program("maketx"), program("oiiotool")
-    if tool is None:
-        return
+    maketx, oiiotool = program("maketx"), program("oiiotool")
+    tool = str(built_program("mb-envmap", "tools"))
     source = panorama(1024, lights=True)
     with tempfile.TemporaryDirectory() as folder:
         path, ours, theirs = (str(Path(folder) / name) for name in ("panorama.exr", "ours.exr", "theirs.exr"))

@@ -6,31 +6,23 @@ Before that the program bench_rays, which is built first, compares with a bare l
 
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
+from benchmarks._build import built_program
 from benchmarks._report import Case, require, run, seconds
 from mirrorbake import _core as core
 
 RAYS = 1_000_000
 
 
-def built_bench_rays() -> Path:
-    root = Path(__file__).parents[1]
-    print("==> building bench_rays (some minutes the first time)", file=sys.stderr)
-    for command in (["--preset", "release"], ["--build", "--preset", "release", "--target", "bench_rays"]):
-        subprocess.run(["cmake", *command], cwd=root, stdout=subprocess.DEVNULL, check=True)
-    return root / "build/release/cpp/bench/bench_rays"
-
-
 def bare_embree() -> Iterator[Case]:
-    done = subprocess.run([built_bench_rays()], stdout=subprocess.PIPE, text=True, check=False)
+    program = built_program("bench_rays", "bench")
+    done = subprocess.run([program], stdout=subprocess.PIPE, text=True, check=False)
     require(done.returncode == 0, "bench_rays says so")
     for line in done.stdout.splitlines():
         row = json.loads(line)

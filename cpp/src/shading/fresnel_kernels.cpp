@@ -31,9 +31,11 @@ inline bool runs_backwards(const void* c, const void* f) {
   return ahead > 0 && ahead < kPage / 2;
 }
 
-/// How far ahead of itself a loop asks for the lines that it will write: a store to one that is in no cache waits for
-/// it, and the processor fetches ahead for loads alone.
-constexpr std::size_t kAheadBytes = 2048;
+/// How far ahead of itself a loop asks for memory. For what it will write: a store to a line that is in no cache waits
+/// for it, and the processor fetches ahead for loads alone. For what it will read past the caches' size: the processor
+/// does not fetch ahead across pages.
+constexpr std::size_t kWriteAheadBytes = 2048;
+constexpr std::size_t kReadAheadBytes = 4096;
 
 /// Writes a vector to aligned memory without reading it into the caches first, where the processor can.
 inline void write_past_caches(void* to, const void* from) {
@@ -73,12 +75,14 @@ inline void evaluate_vector(const FresnelBatch<T>& batch, std::size_t first, boo
   constexpr std::size_t kVector = kVectorBytes / sizeof(T);
   T* const f = batch.f + first;
   if constexpr (kPastCaches) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(batch.c + first);
+    __builtin_prefetch(backwards ? bytes - kReadAheadBytes : bytes + kReadAheadBytes, 0);
     alignas(kVectorBytes) T values[kVector];
     evaluate(batch.c + first, values, first, kVector, formula);
     write_past_caches(f, values);
   } else {
     const auto* bytes = reinterpret_cast<const unsigned char*>(f);
-    __builtin_prefetch(backwards ? bytes - kAheadBytes : bytes + kAheadBytes, 1);
+    __builtin_prefetch(backwards ? bytes - kWriteAheadBytes : bytes + kWriteAheadBytes, 1);
     evaluate(batch.c + first, f, first, kVector, formula);
   }
 }

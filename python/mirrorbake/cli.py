@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from mirrorbake.bake import ProgressReport
+    from mirrorbake.config import SceneConfig
     from mirrorbake.evaluate import Evaluation
     from mirrorbake.plan import Plan
 
@@ -142,14 +143,28 @@ Assignments = Annotated[
 ]
 
 
-def _overrides(assignments: list[str] | None, **values: Any) -> list[tuple[tuple[str, ...], Any]]:
-    """Join --set with the options that have names of their own; `views_count` stands for views.count."""
-    overrides = [_parse_set(text) for text in assignments or []]
-    for key, value in values.items():
-        if value is not None:
-            section, _, name = key.partition("_")
-            overrides.append(((section, name), value))
-    return overrides
+def _scene_config(
+    scene: Path,
+    assignments: list[str] | None,
+    views: int | None,
+    size: str | None,
+    spp: int | None,
+    em_size: int | None,
+    seed: int | None,
+) -> SceneConfig:
+    """Load a scene file, with --set and the options that have names of their own instead of its values."""
+    from mirrorbake.config import load_config
+
+    named = {
+        ("views", "count"): views,
+        ("views", "size"): None if size is None else _parse_size(size),
+        ("trace", "samples"): spp,
+        ("maps", "size"): em_size,
+        ("trace", "seed"): seed,
+    }
+    overrides: list[tuple[tuple[str, ...], Any]] = [_parse_set(text) for text in assignments or []]
+    overrides += [(key, value) for key, value in named.items() if value is not None]
+    return load_config(scene, overrides)
 
 
 def _print_plan(plan: Plan) -> None:
@@ -183,19 +198,8 @@ def bake_command(
     What the scene leaves to be decided ("auto") is decided first and printed, as `analyze` does.
     """
     from mirrorbake.bake import bake
-    from mirrorbake.config import load_config
 
-    config = load_config(
-        scene,
-        _overrides(
-            assignments,
-            views_count=views,
-            views_size=None if size is None else _parse_size(size),
-            trace_samples=spp,
-            maps_size=em_size,
-            trace_seed=seed,
-        ),
-    )
+    config = _scene_config(scene, assignments, views, size, spp, em_size, seed)
     limit = _core.ThreadLimit(threads)
     with _progress() as add_bar:
         summary = bake(config, out, add_bar("bake"), on_plan=_print_plan)
@@ -228,20 +232,9 @@ def analyze_command(
     import json as json_module
 
     from mirrorbake.analyze import analyze
-    from mirrorbake.config import load_config
     from mirrorbake.scene import prepare_stage
 
-    config = load_config(
-        scene,
-        _overrides(
-            assignments,
-            views_count=views,
-            views_size=None if size is None else _parse_size(size),
-            trace_samples=spp,
-            maps_size=em_size,
-            trace_seed=seed,
-        ),
-    )
+    config = _scene_config(scene, assignments, views, size, spp, em_size, seed)
     limit = _core.ThreadLimit(threads)
     plan = analyze(prepare_stage(config))
     del limit

@@ -298,6 +298,10 @@ def _resampler(
     height, width = size
     matrix = np.eye(3, dtype=np.float32) if source_from_target is None else source_from_target
     matrix = np.ascontiguousarray(matrix, np.float32)
+    if matrix.shape != (3, 3):
+        raise _core.InvalidArgument(f"source_from_target has shape {matrix.shape}, expected (3, 3)")
+    if max_bytes < 0:
+        raise _core.InvalidArgument(f"max_bytes is {max_bytes}, expected 0 or more")
     return _core.Resampler(source, projection, width, height, filter, matrix, max_bytes)
 
 

@@ -76,6 +76,14 @@ def test_a_resampler_gives_the_same_bits_as_resampling() -> None:
     assert Resampler(maps[0].layout, "cube", 8, max_bytes=0).bytes == 0
 
 
+def test_a_resampler_names_the_argument_that_it_cannot_use() -> None:
+    layout = noise("latlong", 4).layout
+    with pytest.raises(ValueError, match=r"source_from_target has shape \(4, 4\), expected \(3, 3\)"):
+        Resampler(layout, "cube", 3, source_from_target=np.eye(4))
+    with pytest.raises(ValueError, match="max_bytes is -1, expected 0 or more"):
+        Resampler(layout, "cube", 3, max_bytes=-1)
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     projection=st.sampled_from(PROJECTIONS),

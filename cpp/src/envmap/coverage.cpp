@@ -4,6 +4,13 @@
 #include <utility>
 
 namespace mirrorbake {
+namespace {
+
+double signed_area(const std::array<glm::dvec2, 4>& p) {
+  return 0.5 * ((p[2].x - p[0].x) * (p[3].y - p[1].y) - (p[3].x - p[1].x) * (p[2].y - p[0].y));
+}
+
+}  // namespace
 
 void Coverage::rasterize(const std::array<glm::dvec2, 4>& p) {
   left_ = floor_of(std::min(std::min(p[0].x, p[1].x), std::min(p[2].x, p[3].x)));

@@ -55,9 +55,4 @@ class Coverage {
   double sign_ = 1.0;
 };
 
-/// Signed area of a quadrilateral.
-inline double signed_area(const std::array<glm::dvec2, 4>& p) {
-  return 0.5 * ((p[2].x - p[0].x) * (p[3].y - p[1].y) - (p[3].x - p[1].x) * (p[2].y - p[0].y));
-}
-
 }  // namespace mirrorbake

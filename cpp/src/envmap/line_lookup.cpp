@@ -19,26 +19,25 @@ LineTables::LineTables(const Projection& target, std::vector<double> x_) : x(std
   v.resize(x.size());
 }
 
+PositionLoop position_loop(ProjectionKind kind) {
+  switch (kind) {
+    case ProjectionKind::latlong: return resample_kernels().latlong_positions;
+    case ProjectionKind::cube: return resample_kernels().cube_positions;
+    case ProjectionKind::dual_paraboloid: return resample_kernels().dual_paraboloid_positions;
+    default: return nullptr;
+  }
+}
+
 LineLookup::LineLookup(const ResampleJob& job, const LineTables& tables)
-    : job_(job), tables_(tables), kernels_(resample_kernels()) {}
+    : job_(job), tables_(tables), find_positions_(position_loop(job.projection().kind)) {}
 
 void LineLookup::find(int face, double y, int first, std::size_t count, Positions& result,
                       std::size_t offset) {
   for (std::vector<double>* d : {&dx_, &dy_, &dz_}) d->resize(count);
   set_directions(face, y, static_cast<std::size_t>(first), count);
   const PositionArrays to = result.from(offset);
-  switch (job_.projection().kind) {
-    case ProjectionKind::latlong:
-      kernels_.latlong_positions(dx_.data(), dy_.data(), dz_.data(), count, job_.width(), job_.height(), to);
-      return;
-    case ProjectionKind::cube:
-      kernels_.cube_positions(dx_.data(), dy_.data(), dz_.data(), count, job_.width(), job_.height(), to);
-      return;
-    case ProjectionKind::dual_paraboloid:
-      kernels_.dual_paraboloid_positions(dx_.data(), dy_.data(), dz_.data(), count, job_.width(),
-                                         job_.height(), to);
-      return;
-    default: break;
+  if (find_positions_ != nullptr) {
+    return find_positions_(dx_.data(), dy_.data(), dz_.data(), count, job_.width(), job_.height(), to);
   }
   for (std::size_t i = 0; i < count; ++i) {
     const MapPoint point = point_from_direction(job_.projection(), {dx_[i], dy_[i], dz_[i]});

@@ -22,6 +22,9 @@ struct Positions {
   PositionArrays from(std::size_t i) { return {x.data() + i, y.data() + i, face.data() + i}; }
 };
 
+/// The vectorised loop for a projection; null where there is none.
+PositionLoop position_loop(ProjectionKind kind);
+
 /// The x of points along a line of the target, and what their directions are made of.
 struct LineTables {
   LineTables(const Projection& target, std::vector<double> x);
@@ -43,7 +46,7 @@ class LineLookup {
 
   const ResampleJob& job_;
   const LineTables& tables_;
-  const ResampleKernels& kernels_;
+  const PositionLoop find_positions_;  // may be null
   std::vector<double> dx_, dy_, dz_;
 };
 

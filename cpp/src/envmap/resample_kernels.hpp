@@ -56,14 +56,14 @@ struct TapGroup {
   std::uint32_t targets;
 };
 
+/// Where directions of any length > 0, one array per component, lie in a map.
+using PositionLoop = void (*)(const double* dx, const double* dy, const double* dz, std::size_t count,
+                              int width, int height, const PositionArrays& result);
+
 struct ResampleKernels {
-  /// Directions of any length > 0, one array per component.
-  void (*latlong_positions)(const double* dx, const double* dy, const double* dz, std::size_t count,
-                            int width, int height, const PositionArrays& result);
-  void (*cube_positions)(const double* dx, const double* dy, const double* dz, std::size_t count, int width,
-                         int height, const PositionArrays& result);
-  void (*dual_paraboloid_positions)(const double* dx, const double* dy, const double* dz, std::size_t count,
-                                    int width, int height, const PositionArrays& result);
+  PositionLoop latlong_positions;
+  PositionLoop cube_positions;
+  PositionLoop dual_paraboloid_positions;
 
   /// Kinds of a row of texels between two rows of count + 1 corners: irregular unless all four are on one
   /// face and the edges straight; then kArea or, with `automatic`, by the share that interpolation has.

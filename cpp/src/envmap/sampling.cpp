@@ -11,10 +11,10 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
+#include "line_lookup.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/envmap/texel_lookup.hpp"
-#include "resample_kernels.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -183,16 +183,10 @@ struct Sampler {
   }
 };
 
-// Whether ResampleKernels has a loop for the positions of directions.
-bool has_position_kernel(ProjectionKind kind) {
-  return kind == ProjectionKind::latlong || kind == ProjectionKind::cube ||
-         kind == ProjectionKind::dual_paraboloid;
-}
-
 // Bilinear lookups in the finest level, whose positions come from a vectorised loop. Returns the number of
 // directions that are not finite or zero.
-std::size_t sample_bilinear(const EnvMapView& map, std::span<const glm::vec3> directions,
-                            std::span<float> values) {
+std::size_t sample_bilinear(const EnvMapView& map, PositionLoop positions,
+                            std::span<const glm::vec3> directions, std::span<float> values) {
   const EnvMapLayout& layout = map.layout;
   const std::size_t count = directions.size();
   const std::size_t channels = static_cast<std::size_t>(layout.channels);
@@ -214,11 +208,7 @@ std::size_t sample_bilinear(const EnvMapView& map, std::span<const glm::vec3> di
   std::vector<double> x(count);
   std::vector<double> y(count);
   std::vector<std::int32_t> face(count);
-  const ResampleKernels& kernels = resample_kernels();
-  const auto find = layout.projection.kind == ProjectionKind::latlong ? kernels.latlong_positions
-                    : layout.projection.kind == ProjectionKind::cube  ? kernels.cube_positions
-                                                                      : kernels.dual_paraboloid_positions;
-  find(dx, dy, dz, count, layout.width, layout.height, {x.data(), y.data(), face.data()});
+  positions(dx, dy, dz, count, layout.width, layout.height, {x.data(), y.data(), face.data()});
 
   const std::size_t line = static_cast<std::size_t>(layout.width) * channels;
   const std::size_t face_values = line * static_cast<std::size_t>(layout.height);
@@ -281,11 +271,11 @@ std::size_t sample(const EnvMapView& map, std::span<const glm::vec3> directions,
     throw InvalidArgument("max_anisotropy", std::to_string(options.max_anisotropy), "at least 1");
   }
   std::atomic<std::size_t> unusable{0};
-  const bool vectorised =
-      options.filter == SampleFilter::bilinear && has_position_kernel(map.layout.projection.kind);
+  const PositionLoop positions =
+      options.filter == SampleFilter::bilinear ? position_loop(map.layout.projection.kind) : nullptr;
   parallel_for(directions.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    if (vectorised) {
-      unusable += sample_bilinear(map, directions.subspan(begin, end - begin),
+    if (positions != nullptr) {
+      unusable += sample_bilinear(map, positions, directions.subspan(begin, end - begin),
                                   values.subspan(begin * channels, (end - begin) * channels));
       return;
     }

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 from benchmarks._report import Case, require, seconds
 from mirrorbake import _core
-from mirrorbake.proxy import Proxy, fit_ellipsoid
+from mirrorbake.proxy import Proxy, fit_ellipsoid, mirror_lookups
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -138,8 +138,7 @@ def cases() -> Iterator[Case]:
             )
 
         def vertices() -> None:
-            box.mirror_lookup((0, 1, 5), p, d)
-            ellipsoid.mirror_lookup((0, 1, 5), p, d)
+            mirror_lookups((box, ellipsoid), (0, 1, 5), p, d)
 
         # [PEM] section 6: 35 ms per frame for the texture coordinates of this many vertices.
         time = seconds(vertices, REPETITIONS)

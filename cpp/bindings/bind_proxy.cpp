@@ -90,21 +90,24 @@ void check_rays(const RayArray<Real>& positions, const char* second, const RayAr
   if (!same) throw InvalidArgument(second, "of shape " + shape_text(directions), "the shape of positions");
 }
 
-/// Calls `compute(first, second, results)` on arrays of xyz triples and returns the results in their shape.
+/// Calls `compute(first, second, results)` on arrays of xyz triples and returns the results in their shape, or with
+/// the number of `layers`, if any, before it.
 template <typename Real, typename Compute>
 nb::ndarray<nb::numpy, Real> map_triples(const RayArray<Real>& first, const RayArray<Real>& second,
-                                         Compute compute) {
+                                         std::optional<std::size_t> layers, Compute compute) {
   using Vector = glm::vec<3, Real>;
   const std::size_t count = first.size() / 3;
-  auto* results = new Real[first.size()];  // not initialised: all of it is written below, or thrown away
+  const std::size_t results_count = layers.value_or(1) * count;
+  auto* results = new Real[3 * results_count];  // not initialised: all of it is written below, or thrown away
   nb::capsule owner(results, [](void* p) noexcept { delete[] static_cast<Real*>(p); });
   {
     nb::gil_scoped_release release;
     compute(std::span(reinterpret_cast<const Vector*>(first.data()), count),
             std::span(reinterpret_cast<const Vector*>(second.data()), count),
-            std::span(reinterpret_cast<Vector*>(results), count));
+            std::span(reinterpret_cast<Vector*>(results), results_count));
   }
   std::vector<std::size_t> shape;
+  if (layers) shape.push_back(*layers);
   for (std::size_t i = 0; i < first.ndim(); ++i) shape.push_back(first.shape(i));
   return nb::ndarray<nb::numpy, Real>(results, shape.size(), shape.data(), owner);
 }
@@ -113,7 +116,7 @@ template <typename Real>
 nb::ndarray<nb::numpy, Real> lookup(const Proxy& proxy, const RayArray<Real>& positions,
                                     const RayArray<Real>& directions) {
   check_rays(positions, "directions", directions);
-  return map_triples(positions, directions,
+  return map_triples(positions, directions, std::nullopt,
                      [&](auto p, auto d, auto lookups) { lookup_directions(proxy, p, d, lookups); });
 }
 
@@ -121,8 +124,17 @@ nb::ndarray<nb::numpy, float> mirror_lookup(const Proxy& proxy, glm::vec3 eye,
                                             const RayArray<float>& positions,
                                             const RayArray<float>& normals) {
   check_rays(positions, "normals", normals);
-  return map_triples(positions, normals,
-                     [&](auto p, auto n, auto lookups) { mirror_lookups(proxy, eye, p, n, lookups); });
+  return map_triples(positions, normals, std::nullopt, [&](auto p, auto n, auto lookups) {
+    mirror_lookups(std::span(&proxy, 1), eye, p, n, lookups);
+  });
+}
+
+nb::ndarray<nb::numpy, float> mirror_lookups_of_layers(const std::vector<Proxy>& proxies, glm::vec3 eye,
+                                                       const RayArray<float>& positions,
+                                                       const RayArray<float>& normals) {
+  check_rays(positions, "normals", normals);
+  return map_triples(positions, normals, proxies.size(),
+                     [&](auto p, auto n, auto lookups) { mirror_lookups(proxies, eye, p, n, lookups); });
 }
 
 std::span<const glm::vec3> points(const PointArray& array) {
@@ -241,7 +253,7 @@ InvalidArgument
       .def("lookup_float64", &lookup<double>, nb::arg("positions"), nb::arg("directions"),
            "lookup() with float64 coordinates and results.")
       .def("mirror_lookup", &mirror_lookup, nb::arg("eye"), nb::arg("positions"), nb::arg("normals"),
-           R"(Texture coordinates of a mirror's vertices or pixels ([PEM] section 4).
+           R"(Texture coordinates of a mirror's vertices or pixels in one layer ([PEM] section 4).
 
 Lookups along the reflections of the rays from `eye` (x, y, z) to the `positions` about the `normals`.
 
@@ -270,6 +282,26 @@ InvalidArgument
         return text + ")";
       });
 
+  m.def("mirror_lookups", &mirror_lookups_of_layers, nb::arg("proxies"), nb::arg("eye"), nb::arg("positions"),
+        nb::arg("normals"), R"(Texture coordinates of a mirror's vertices or pixels in several layers at once.
+
+As Proxy.mirror_lookup() of each of the `proxies`, to the bit, but vertices are read and rays reflected once.
+
+Parameters
+----------
+proxies
+    One per layer, at least one.
+eye, positions, normals
+    As for Proxy.mirror_lookup().
+
+Returns
+-------
+    Array of shape (len(proxies), ..., 3): directions in which the maps are read, not normalised.
+
+Raises
+------
+InvalidArgument
+    As Proxy.mirror_lookup(); no proxies.)");
   m.def(
       "area_weighted_centroid",
       [](PointArray positions, TriangleArray triangles) {

@@ -17,13 +17,14 @@
 namespace mirrorbake::bindings {
 namespace {
 
+/// Of any shape, which the functions do not look at.
 template <typename T>
-using Values = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Values = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
 template <typename T>
-using Output = nb::ndarray<T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Output = nb::ndarray<T, nb::c_contig, nb::device::cpu>;
 
 template <typename T>
-std::span<T> span_of(const nb::ndarray<T, nb::ndim<1>, nb::c_contig, nb::device::cpu>& array) {
+std::span<T> span_of(const nb::ndarray<T, nb::c_contig, nb::device::cpu>& array) {
   return {array.data(), array.size()};
 }
 
@@ -175,7 +176,8 @@ void bind_shading(nb::module_& m) {
         }
         return to_numpy(std::move(rgb), {c.size(), 3});
       },
-      nb::arg("metal"), nb::arg("c").noconvert(), nb::arg("illuminant"), "float64 (n, 3): linear Rec.709.");
+      nb::arg("metal"), nb::arg("c").noconvert(), nb::arg("illuminant"),
+      "float64 (c.size, 3): linear Rec.709.");
   m.def(
       "fit_metal",
       [](const std::string& metal, const std::string& illuminant) {

@@ -126,7 +126,7 @@ class Proxy:
 
     def mirror_lookup(self, eye: Sequence[float], positions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """
-        Texture coordinates of a mirror's vertices or pixels ([PEM] section 4).
+        Texture coordinates of a mirror's vertices or pixels in one layer ([PEM] section 4).
 
         Lookups along the reflections of the rays from `eye` (x, y, z) to the `positions` about the `normals`.
 
@@ -149,6 +149,29 @@ class Proxy:
         """Raises InvalidArgument, naming the field, if the proxy is not usable."""
 
     def __repr__(self) -> str: ...
+
+def mirror_lookups(proxies: Sequence[Proxy], eye: Sequence[float], positions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+    """
+    Texture coordinates of a mirror's vertices or pixels in several layers at once.
+
+    As Proxy.mirror_lookup() of each of the `proxies`, to the bit, but vertices are read and rays reflected once.
+
+    Parameters
+    ----------
+    proxies
+        One per layer, at least one.
+    eye, positions, normals
+        As for Proxy.mirror_lookup().
+
+    Returns
+    -------
+        Array of shape (len(proxies), ..., 3): directions in which the maps are read, not normalised.
+
+    Raises
+    ------
+    InvalidArgument
+        As Proxy.mirror_lookup(); no proxies.
+    """
 
 def area_weighted_centroid(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Sequence[float]:
     """
@@ -1493,40 +1516,40 @@ def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArra
     """
 
 @overload
-def fresnel_schlick(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], r0: float, f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_schlick(c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], r0: float, f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_schlick(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], r0: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_schlick(c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], r0: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_schlick(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], r0: float, f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_schlick(c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], r0: float, f: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_schlick(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], r0: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_schlick(c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], r0: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_dielectric(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], ior: float, f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_dielectric(c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], ior: float, f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_dielectric(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], ior: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_dielectric(c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], ior: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_dielectric(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], ior: float, f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_dielectric(c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], ior: float, f: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_dielectric(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], ior: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_dielectric(c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], ior: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_conductor(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], eta: float, k: float, f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_conductor(c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], eta: float, k: float, f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_conductor(c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], eta: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], k: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_conductor(c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], eta: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], k: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_conductor(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], eta: float, k: float, f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_conductor(c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], eta: float, k: float, f: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
 @overload
-def fresnel_conductor(c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], eta: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], k: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+def fresnel_conductor(c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], eta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], k: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
 def fresnel_dielectric_transmittance(c: float, ior: float) -> float:
     """1 − F without cancellation."""
@@ -1543,10 +1566,10 @@ class FresnelTable:
         """Largest deviation from the exact curve."""
 
     @overload
-    def evaluate(self, c: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu')]) -> None: ...
+    def evaluate(self, c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...
 
     @overload
-    def evaluate(self, c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> None:
+    def evaluate(self, c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
         """Fills `f` with interpolated reflectance."""
 
 def make_fresnel_table(model: FresnelModel, first: float, k: float, size: int) -> FresnelTable:
@@ -1565,8 +1588,8 @@ def metal_source(metal: str) -> str:
 def metal_optical_constants(metal: str) -> NDArray[numpy.float64]:
     """float64 (n, 3): wavelength in nm, eta, k."""
 
-def metal_reflectance(metal: str, c: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], illuminant: str) -> NDArray[numpy.float64]:
-    """float64 (n, 3): linear Rec.709."""
+def metal_reflectance(metal: str, c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], illuminant: str) -> NDArray[numpy.float64]:
+    """float64 (c.size, 3): linear Rec.709."""
 
 def fit_metal(metal: str, illuminant: str) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
     """(r0, its error, eta, k, their error), each per channel."""

@@ -51,30 +51,26 @@ def _result_type(*values: ArrayLike) -> type[np.float32] | type[np.float64]:
     return np.float32 if arrays and all(dtype == np.float32 for dtype in arrays) else np.float64
 
 
+def _broadcast(c: ArrayLike, parameters: tuple[ArrayLike, ...]) -> tuple[Array, tuple[Any, ...]]:
+    """Cosines and parameters of one type: one number per parameter where all are scalars, else arrays."""
+    dtype: Any = _result_type(c, *parameters)
+    if all(np.ndim(parameter) == 0 for parameter in parameters):
+        return np.asarray(c, dtype), tuple(float(np.asarray(parameter)) for parameter in parameters)
+    arrays = np.broadcast_arrays(*(np.asarray(value, dtype) for value in (c, *parameters)))
+    return arrays[0], tuple(np.ascontiguousarray(array) for array in arrays[1:])
+
+
 def _apply(function: Any, out: Array | None, c: ArrayLike, *parameters: ArrayLike) -> Array:
-    """Call a function of flat arrays: one number per parameter where all are scalars, arrays otherwise."""
-    arrays: list[Any]
-    numbers: list[float] = []
-    if type(c) is np.ndarray and c.dtype in _NATIVE and all(isinstance(p, float) for p in parameters):
-        # The usual case, without the microseconds that the general one takes.
-        dtype: Any = c.dtype
-        arrays, numbers = [c], list(parameters)  # type: ignore[arg-type]
-    else:
-        dtype = _result_type(c, *parameters)
-        arrays = [np.asarray(c, dtype)]
-        if all(np.ndim(parameter) == 0 for parameter in parameters):
-            numbers = [float(np.asarray(parameter)) for parameter in parameters]
-        else:
-            arrays += [np.asarray(parameter, dtype) for parameter in parameters]
-            arrays = list(np.broadcast_arrays(*arrays))
-    shape = arrays[0].shape
+    """Call a function of C-contiguous arrays of one type; arrays with plain numbers go straight to it."""
+    arguments: tuple[Any, ...] = parameters
+    if not (type(c) is np.ndarray and c.dtype in _NATIVE and all(isinstance(p, float) for p in parameters)):
+        c, arguments = _broadcast(c, parameters)
     if out is None:
-        out = np.empty(shape, dtype)
-    elif out.shape != shape or out.dtype != dtype or not out.flags.c_contiguous:
-        message = f"out is {out.dtype} {out.shape}, expected C-contiguous {np.dtype(dtype)} {shape}"
+        out = np.empty(c.shape, c.dtype)
+    elif out.shape != c.shape or out.dtype != c.dtype or not out.flags.c_contiguous:
+        message = f"out is {out.dtype} {out.shape}, expected C-contiguous {c.dtype} {c.shape}"
         raise _core.InvalidArgument(message)
-    flat = [np.ascontiguousarray(array).reshape(-1) for array in arrays]
-    function(flat[0], *numbers, *flat[1:], out.reshape(-1))
+    function(np.ascontiguousarray(c), *arguments, out)
     return out
 
 
@@ -279,7 +275,7 @@ def metal_reflectance(metal: str, c: ArrayLike, illuminant: str = "D65") -> npt.
     CIE 1931 2° observer, 380 to 780 nm in steps of 5 nm; Johnson & Christy 1972, 1974, Rakić 1995.
     """
     cosines = np.asarray(c, np.float64)
-    flat = _core.metal_reflectance(metal, np.ascontiguousarray(cosines).reshape(-1), illuminant)
+    flat = _core.metal_reflectance(metal, np.ascontiguousarray(cosines), illuminant)
     return np.asarray(flat.reshape((*cosines.shape, 3)))
 
 

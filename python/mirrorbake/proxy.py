@@ -26,6 +26,7 @@ from mirrorbake._core import (
     fit_box_mean_distance,
     fit_box_robust,
     fit_ellipsoid,
+    mirror_lookups,
 )
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "fit_box_robust",
     "fit_ellipsoid",
     "hull_triangles",
+    "mirror_lookups",
 ]
 
 

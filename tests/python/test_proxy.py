@@ -16,6 +16,7 @@ from mirrorbake.proxy import (
     fit_box_robust,
     fit_ellipsoid,
     hull_triangles,
+    mirror_lookups,
 )
 
 # Orthonormal in exact decimals.
@@ -176,6 +177,24 @@ def test_mirror_lookups_follow_the_reflection_of_the_eyes_ray() -> None:
     assert angles(lookup, expected).max() < 2e-7
     with pytest.raises(ValueError, match="normals"):
         proxy.mirror_lookup(eye, p, n[:3])
+
+
+def test_mirror_lookups_of_several_layers_are_those_of_each() -> None:
+    rng = np.random.default_rng(8)
+    proxies = [
+        Proxy.box((0, 0, 0), (2, 3, 4), origin=(0.5, 0, 0)),
+        Proxy.infinite(),
+        Proxy.ellipsoid((0.1, 0, 0), (3, 2, 2.5)),
+    ]
+    eye = (5.0, 6.0, 7.0)
+    p = rng.uniform(-1, 1, (6, 7, 3)).astype(np.float32)
+    n = rng.normal(size=(6, 7, 3)).astype(np.float32)
+    layers = mirror_lookups(proxies, eye, p, n)
+    assert layers.shape == (3, 6, 7, 3)
+    for layer, proxy in zip(layers, proxies, strict=True):
+        np.testing.assert_array_equal(layer, proxy.mirror_lookup(eye, p, n))
+    with pytest.raises(ValueError, match=r"proxies.*empty"):
+        mirror_lookups([], eye, p, n)
 
 
 def test_hull_triangles_are_those_of_qhull() -> None:

@@ -2,6 +2,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include <glm/geometric.hpp>
 
@@ -96,18 +97,20 @@ void check_row(std::string_view name, std::span<const Vector> vectors, std::size
 /// Rays per task: some 50 µs.
 constexpr std::size_t kGrain = 16384;
 
-/// Runs `kernel(positions, seconds, lookups, count)`, which says how many it is done with, on all rays.
+/// Runs `kernel(positions, seconds, lookups, count)`, which says how many it is done with, on all rays; there are
+/// `proxy_count` lookups for each.
 template <typename Vector, typename Kernel>
 void map_rays(std::span<const Vector> positions, std::string_view second_name,
-              std::span<const Vector> seconds, std::span<Vector> lookups, Kernel kernel) {
+              std::span<const Vector> seconds, std::span<Vector> lookups, std::size_t proxy_count,
+              Kernel kernel) {
   const std::size_t count = positions.size();
   if (seconds.size() != count) {
     throw InvalidArgument(second_name, std::to_string(seconds.size()) + " elements",
                           "as many as positions: " + std::to_string(count));
   }
-  if (lookups.size() != count) {
+  if (lookups.size() != proxy_count * count) {
     throw InvalidArgument("lookups", std::to_string(lookups.size()) + " elements",
-                          "as many as positions: " + std::to_string(count));
+                          "one for each position and proxy: " + std::to_string(proxy_count * count));
   }
   std::atomic<std::size_t> first_left = count;
   parallel_for(count, kGrain, [&](std::size_t begin, std::size_t end) {
@@ -138,7 +141,7 @@ glm::dvec3 lookup_direction(const Proxy& proxy, glm::dvec3 position, glm::dvec3 
 void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
                        std::span<const glm::vec3> directions, std::span<glm::vec3> lookups) {
   const LookupConstants k = constants(proxy);
-  map_rays(positions, "directions", directions, lookups,
+  map_rays(positions, "directions", directions, lookups, 1,
            [&](const float* p, const float* d, float* l, std::size_t count) {
              return lookup_kernels().rays_f32(k, p, d, l, count);
            });
@@ -147,21 +150,23 @@ void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
 void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions,
                        std::span<const glm::dvec3> directions, std::span<glm::dvec3> lookups) {
   const LookupConstants k = constants(proxy);
-  map_rays(positions, "directions", directions, lookups,
+  map_rays(positions, "directions", directions, lookups, 1,
            [&](const double* p, const double* d, double* l, std::size_t count) {
              return lookup_kernels().rays_f64(k, p, d, l, count);
            });
 }
 
-void mirror_lookups(const Proxy& proxy, glm::vec3 eye, std::span<const glm::vec3> positions,
+void mirror_lookups(std::span<const Proxy> proxies, glm::vec3 eye, std::span<const glm::vec3> positions,
                     std::span<const glm::vec3> normals, std::span<glm::vec3> lookups) {
+  if (proxies.empty()) throw InvalidArgument("proxies", "empty", "at least one");
   if (!detail::is_finite(eye)) throw InvalidArgument("eye", detail::vec_text(eye), "finite");
-  const LookupConstants k = constants(proxy);
+  std::vector<LookupConstants> k;
+  for (const Proxy& proxy : proxies) k.push_back(constants(proxy));
   double e[3];
   set(e, eye);
-  map_rays(positions, "normals", normals, lookups,
+  map_rays(positions, "normals", normals, lookups, k.size(),
            [&](const float* p, const float* n, float* l, std::size_t count) {
-             return lookup_kernels().mirrors_f32(k, e, p, n, l, count);
+             return lookup_kernels().mirrors_f32(k.data(), k.size(), e, p, n, l, positions.size(), count);
            });
 }
 

@@ -58,62 +58,87 @@ inline Vec vec(const Block<T>& block, std::size_t i) {
   return {static_cast<double>(block.x[i]), static_cast<double>(block.y[i]), static_cast<double>(block.z[i])};
 }
 
-/// lookups[i] = lookup along direction(position i, second i), block by block.
-template <LookupShape shape, bool rotated, typename T, typename Direction>
-std::size_t loop(const LookupConstants& constants, const T* positions, const T* seconds, T* lookups,
-                 std::size_t count, Direction direction) {
+/// lookups[i] = lookup from position i along direction i.
+template <LookupShape shape, bool rotated, typename P, typename D>
+void look_up(const LookupConstants& constants, const Block<P>& positions, const Block<D>& directions,
+             std::size_t count, Block<P>& __restrict lookups) {
   const LookupConstants k = constants;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec result = lookup<shape, rotated>(k, vec(positions, i), vec(directions, i));
+    lookups.x[i] = static_cast<P>(result.x);
+    lookups.y[i] = static_cast<P>(result.y);
+    lookups.z[i] = static_cast<P>(result.z);
+  }
+}
+
+template <LookupShape shape, typename P, typename D>
+void look_up_shape(const LookupConstants& k, const Block<P>& positions, const Block<D>& directions,
+                   std::size_t count, Block<P>& lookups) {
+  if (k.rotated) {
+    look_up<shape, true>(k, positions, directions, count, lookups);
+  } else {
+    look_up<shape, false>(k, positions, directions, count, lookups);
+  }
+}
+
+template <typename P, typename D>
+void look_up_block(const LookupConstants& k, const Block<P>& positions, const Block<D>& directions,
+                   std::size_t count, Block<P>& lookups) {
+  switch (k.shape) {
+    case LookupShape::infinite:
+      return look_up<LookupShape::infinite, false>(k, positions, directions, count, lookups);
+    case LookupShape::box: return look_up_shape<LookupShape::box>(k, positions, directions, count, lookups);
+    case LookupShape::ellipsoid:
+      return look_up_shape<LookupShape::ellipsoid>(k, positions, directions, count, lookups);
+    case LookupShape::hemisphere:
+      return look_up_shape<LookupShape::hemisphere>(k, positions, directions, count, lookups);
+  }
+}
+
+/// Calls block(first ray, count, positions, seconds) for block after block.
+template <typename T, typename Function>
+std::size_t for_blocks(const T* positions, const T* seconds, std::size_t count, Function block) {
   Block<T> p, s;
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t n = count - begin < kBlock ? count - begin : kBlock;
     load(positions + 3 * begin, n, p);
     load(seconds + 3 * begin, n, s);
     if (!all_finite(p, s, n)) return begin;
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vec position = vec(p, i);
-      const Vec second = vec(s, i);
-      const Vec result = lookup<shape, rotated>(k, position, direction(position, second));
-      p.x[i] = static_cast<T>(result.x);
-      p.y[i] = static_cast<T>(result.y);
-      p.z[i] = static_cast<T>(result.z);
-    }
-    store(p, n, lookups + 3 * begin);
+    block(begin, n, p, s);
   }
   return count;
-}
-
-template <typename T, typename Direction>
-std::size_t loop_of_shape(const LookupConstants& k, const T* positions, const T* seconds, T* lookups,
-                          std::size_t count, Direction direction) {
-  switch (k.shape) {
-    case LookupShape::infinite:
-      return loop<LookupShape::infinite, false>(k, positions, seconds, lookups, count, direction);
-    case LookupShape::box:
-      return k.rotated ? loop<LookupShape::box, true>(k, positions, seconds, lookups, count, direction)
-                       : loop<LookupShape::box, false>(k, positions, seconds, lookups, count, direction);
-    case LookupShape::ellipsoid:
-      return k.rotated
-                 ? loop<LookupShape::ellipsoid, true>(k, positions, seconds, lookups, count, direction)
-                 : loop<LookupShape::ellipsoid, false>(k, positions, seconds, lookups, count, direction);
-    case LookupShape::hemisphere:
-      return k.rotated
-                 ? loop<LookupShape::hemisphere, true>(k, positions, seconds, lookups, count, direction)
-                 : loop<LookupShape::hemisphere, false>(k, positions, seconds, lookups, count, direction);
-  }
-  return 0;
 }
 
 template <typename T>
 std::size_t rays(const LookupConstants& k, const T* positions, const T* directions, T* lookups,
                  std::size_t count) {
-  return loop_of_shape(k, positions, directions, lookups, count, [](const Vec&, const Vec& d) { return d; });
+  Block<T> l;
+  return for_blocks(positions, directions, count,
+                    [&](std::size_t begin, std::size_t n, const Block<T>& p, const Block<T>& d) {
+                      look_up_block(k, p, d, n, l);
+                      store(l, n, lookups + 3 * begin);
+                    });
 }
 
-std::size_t mirrors(const LookupConstants& k, const double* eye, const float* positions, const float* normals,
-                    float* lookups, std::size_t count) {
+std::size_t mirrors(const LookupConstants* proxies, std::size_t proxy_count, const double* eye,
+                    const float* positions, const float* normals, float* lookups, std::size_t stride,
+                    std::size_t count) {
   const Vec e = vec(eye);
-  return loop_of_shape(k, positions, normals, lookups, count,
-                       [e](const Vec& p, const Vec& n) { return reflect(p, n, e); });
+  Block<double> d;
+  Block<float> l;
+  return for_blocks(positions, normals, count,
+                    [&](std::size_t begin, std::size_t n, const Block<float>& p, const Block<float>& normal) {
+                      for (std::size_t i = 0; i < n; ++i) {
+                        const Vec direction = reflect(vec(p, i), vec(normal, i), e);
+                        d.x[i] = direction.x;
+                        d.y[i] = direction.y;
+                        d.z[i] = direction.z;
+                      }
+                      for (std::size_t j = 0; j < proxy_count; ++j) {
+                        look_up_block(proxies[j], p, d, n, l);
+                        store(l, n, lookups + 3 * (j * stride + begin));
+                      }
+                    });
 }
 
 }  // namespace

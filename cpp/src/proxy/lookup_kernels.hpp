@@ -19,15 +19,17 @@ struct LookupConstants {
   double origin[3] = {};
 };
 
-/// Arrays of xyz triples; `lookups` may be the same memory as an input. They go through the rays in blocks, stop
-/// before the first block that holds a NaN or an infinite value, and return how many rays they are done with.
+/// Arrays of xyz triples; `lookups` may be the same memory as an input, but for mirrors in several proxies, whose
+/// lookups begin `stride` triples after one another. The loops go through the rays in blocks, stop before the first
+/// block that holds a NaN or an infinite value, and return how many rays they are done with.
 struct LookupKernels {
   std::size_t (*rays_f32)(const LookupConstants& k, const float* positions, const float* directions,
                           float* lookups, std::size_t count);
   std::size_t (*rays_f64)(const LookupConstants& k, const double* positions, const double* directions,
                           double* lookups, std::size_t count);
-  std::size_t (*mirrors_f32)(const LookupConstants& k, const double* eye, const float* positions,
-                             const float* normals, float* lookups, std::size_t count);
+  std::size_t (*mirrors_f32)(const LookupConstants* proxies, std::size_t proxy_count, const double* eye,
+                             const float* positions, const float* normals, float* lookups, std::size_t stride,
+                             std::size_t count);
 };
 
 /// The loops for active_isa().

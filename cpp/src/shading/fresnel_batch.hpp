@@ -12,12 +12,14 @@
 /// What the functions of arrays share: checks, and chunks on several threads.
 namespace mirrorbake {
 
-// Elements per task: twenty microseconds of work and more, against about one to hand it out.
-constexpr std::size_t kFresnelGrain = std::size_t{1} << 16;
-
 // From here on the output is written past the caches: a store to memory that is in none of them reads it first. The
 // price is that whoever reads the result at once finds it in memory (docs/adr/0020 has the figures).
 constexpr std::size_t kLargeBytes = std::size_t{1} << 22;
+
+// Elements per task: some microseconds of work, against about one to hand it out. Tasks that write past the caches end
+// with a wait until that is done, so they are longer.
+constexpr std::size_t kFresnelGrain = std::size_t{1} << 14;
+constexpr std::size_t kLargeFresnelGrain = std::size_t{1} << 17;
 
 template <typename T>
 void check_input(std::string_view name, std::span<const T> input, std::span<T> f) {
@@ -33,23 +35,28 @@ void check_input(std::string_view name, std::span<const T> input, std::span<T> f
   }
 }
 
+/// Calls `kernel(batch, first element)` for each task's part of the arrays.
+template <typename T, typename Kernel>
+void for_batches(std::span<const T> c, std::span<T> f, Kernel kernel) {
+  check_input("c", c, f);
+  const bool is_large = f.size_bytes() >= kLargeBytes;
+  parallel_for(c.size(), is_large ? kLargeFresnelGrain : kFresnelGrain,
+               [&](std::size_t begin, std::size_t end) {
+                 kernel(FresnelBatch<T>{c.data() + begin, f.data() + begin, end - begin, is_large}, begin);
+               });
+}
+
 /// Runs `kernel(batch, parameters…)` over chunks; every parameter is one value for the whole array.
 template <typename T, typename Kernel, typename... Parameters>
 void map_cosines(std::span<const T> c, std::span<T> f, Kernel kernel, Parameters... parameters) {
-  check_input("c", c, f);
-  parallel_for(c.size(), kFresnelGrain, [&](std::size_t begin, std::size_t end) {
-    kernel(FresnelBatch<T>{c.data() + begin, f.data() + begin, end - begin, f.size_bytes() >= kLargeBytes},
-           parameters...);
-  });
+  for_batches(c, f, [&](const FresnelBatch<T>& batch, std::size_t) { kernel(batch, parameters...); });
 }
 
 /// The same with parameters that are arrays too.
 template <typename T, typename Kernel, typename... Parameters>
 void map_cosines_each(std::span<const T> c, std::span<T> f, Kernel kernel, Parameters... parameters) {
-  check_input("c", c, f);
-  parallel_for(c.size(), kFresnelGrain, [&](std::size_t begin, std::size_t end) {
-    kernel(FresnelBatch<T>{c.data() + begin, f.data() + begin, end - begin, f.size_bytes() >= kLargeBytes},
-           (parameters.data() + begin)...);
+  for_batches(c, f, [&](const FresnelBatch<T>& batch, std::size_t begin) {
+    kernel(batch, (parameters.data() + begin)...);
   });
 }
 

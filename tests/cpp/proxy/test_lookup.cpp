@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 #include <glm/geometric.hpp>
@@ -331,7 +332,7 @@ TEST(Lookup, MirrorsFollowTheReflectionOfTheEyesRay) {
       positions[i] = point_at(c.gauge, 0.8L, random);
       normals[i] = random_direction(random);
     }
-    mirror_lookups(c.proxy, eye, positions, normals, lookups);
+    mirror_lookups(std::span(&c.proxy, 1), eye, positions, normals, lookups);
     for (std::size_t i = 0; i < positions.size(); ++i) {
       const Long3 n = glm::normalize(Long3(normals[i]));
       const Long3 v = glm::normalize(Long3(eye) - Long3(positions[i]));
@@ -383,14 +384,17 @@ TEST(Lookup, BatchNamesTheFirstRowThatIsNotFiniteInAnyArrayAndPrecision) {
           EXPECT_THAT(message_of([&] { lookup_directions(box, wide_finite, wide, wide_lookups); }),
                       AllOf(StartsWith("directions"), in_row));
           EXPECT_THAT(message_of([&] {
-                        mirror_lookups(box, {0, 0, 0}, finite, broken, broken);
+                        mirror_lookups(std::span(&box, 1), {0, 0, 0}, finite, broken, broken);
                       }),
                       AllOf(StartsWith("normals"), in_row));
         }
       }
     }
   }
-  EXPECT_THAT(message_of([&] { mirror_lookups(box, {inf, 0, 0}, {}, {}, {}); }), testing::StartsWith("eye"));
+  EXPECT_THAT(message_of([&] {
+                mirror_lookups(std::span(&box, 1), {inf, 0, 0}, {}, {}, {});
+              }),
+              testing::StartsWith("eye"));
 }
 
 TEST(Lookup, BatchTakesFiniteValuesWhoseSumIsNot) {
@@ -401,9 +405,44 @@ TEST(Lookup, BatchTakesFiniteValuesWhoseSumIsNot) {
   EXPECT_EQ(lookups, directions);
 }
 
-TEST(Lookup, MirrorsRejectSpansOfDifferentLength) {
+TEST(Lookup, MirrorsRejectSpansOfDifferentLengthAndNoProxies) {
+  const std::vector<Proxy> proxies(2, Proxy{Box{}, {}});
+  const std::span one(proxies.data(), 1);
   std::vector<glm::vec3> two(2), three(3);
-  EXPECT_THROW(mirror_lookups(Proxy{Box{}, {}}, {0, 0, 0}, two, three, three), InvalidArgument);
+  const auto message = [&](std::span<const Proxy> in, const auto& positions, const auto& normals,
+                           auto& lookups) {
+    return message_of([&] { mirror_lookups(in, {0, 0, 0}, positions, normals, lookups); });
+  };
+  EXPECT_THAT(message(one, two, three, three), testing::StartsWith("normals"));
+  EXPECT_THAT(message(one, two, two, three), testing::StartsWith("lookups"));
+  EXPECT_THAT(message(proxies, two, two, two), testing::StartsWith("lookups"));
+  EXPECT_THAT(message({}, two, two, two), testing::StartsWith("proxies"));
+}
+
+// The blocks that several proxies share must not change a bit, nor mix up layers, at any length.
+TEST(Lookup, MirrorsInSeveralProxiesAreThoseInEach) {
+  std::mt19937 random(8);
+  std::vector<Case> cases = varied_shapes(random);
+  std::vector<Proxy> proxies;
+  for (const Case& c : cases) proxies.push_back(c.proxy);
+  const glm::vec3 eye(3, 4, -5);
+  for (const Isa isa : {Isa::baseline, Isa::sse42, Isa::avx2, Isa::avx512}) {
+    const IsaLimit limit(isa);
+    for (const std::size_t count : {1U, 127U, 128U, 20000U}) {
+      std::vector<glm::vec3> positions(count), normals(count), alone(count);
+      for (std::size_t i = 0; i < count; ++i) {
+        positions[i] = point_at(cases[0].gauge, 0.8L, random);
+        normals[i] = random_direction(random);
+      }
+      std::vector<glm::vec3> lookups(proxies.size() * count);
+      mirror_lookups(proxies, eye, positions, normals, lookups);
+      for (std::size_t j = 0; j < proxies.size(); ++j) {
+        mirror_lookups(std::span(&proxies[j], 1), eye, positions, normals, alone);
+        ASSERT_TRUE(
+            std::equal(alone.begin(), alone.end(), lookups.begin() + static_cast<std::ptrdiff_t>(j * count)));
+      }
+    }
+  }
 }
 
 TEST(ProxyValidation, NamesTheFieldThatIsUnusable) {

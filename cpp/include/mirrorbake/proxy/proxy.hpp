@@ -80,10 +80,12 @@ void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
 void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions,
                        std::span<const glm::dvec3> directions, std::span<glm::dvec3> lookups);
 
-/// Texture coordinates of a mirror's vertices or pixels ([PEM] §4): lookups along the reflections, about the `normals`
-/// (any length > 0), of rays from `eye` to the `positions`. Memory and errors as for lookup_directions; `eye` has to be
-/// finite too.
-void mirror_lookups(const Proxy& proxy, glm::vec3 eye, std::span<const glm::vec3> positions,
+/// Texture coordinates of a mirror's vertices or pixels for one or more layers ([PEM] §4): lookups along the
+/// reflections, about the `normals` (any length > 0), of rays from `eye` to the `positions`. `lookups` holds those in
+/// the first proxy, then those in the second, …: proxies.size() · positions.size() elements. Memory and errors as for
+/// lookup_directions, except that the lookups of several proxies may not replace an input; `eye` has to be finite too,
+/// and `proxies` not empty.
+void mirror_lookups(std::span<const Proxy> proxies, glm::vec3 eye, std::span<const glm::vec3> positions,
                     std::span<const glm::vec3> normals, std::span<glm::vec3> lookups);
 
 /// Throws InvalidArgument, naming the field, if the proxy is not usable: extents not positive or not finite,

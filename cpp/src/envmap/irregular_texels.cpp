@@ -140,10 +140,28 @@ std::optional<std::span<const Tap>> IrregularTexels::find(int face, glm::dvec2 l
       if (!covered(center)) continue;
       gather_point(center, 1.0);
     }
-    for (const Tap& tap : part_) taps_.push_back({tap.texel, part / total_ * tap.weight});
+    take_part(part);
   }
   merge(taps_);
   return taps_;
+}
+
+std::optional<std::span<const Tap>> IrregularTexels::find_straight(int face, const Quad& quad, double share) {
+  taps_.clear();
+  for (const Content content : {Content::constant_texels, Content::interpolated}) {
+    const double part = content == Content::interpolated ? share : 1.0 - share;
+    if (part == 0.0) continue;
+    start(content);
+    gather_quad(face, quad);
+    if (too_many_) return std::nullopt;
+    if (total_ == 0.0) gather_point({{}, face, quad[0]}, 1.0);
+    take_part(part);
+  }
+  return taps_;
+}
+
+void IrregularTexels::take_part(double share) {
+  for (const Tap& tap : part_) taps_.push_back({tap.texel, share / total_ * tap.weight});
 }
 
 double IrregularTexels::stream(int face, glm::dvec2 low, glm::dvec2 high,

@@ -41,6 +41,9 @@ class IrregularTexels {
   /// much that `automatic` does not interpolate.
   std::optional<std::span<const Tap>> find(int face, glm::dvec2 low, glm::dvec2 high);
 
+  /// The same of a texel whose image is a quadrilateral on one face of the source, with this share of interpolation.
+  std::optional<std::span<const Tap>> find_straight(int face, const Quad& quad, double share);
+
   /// Hands the taps of a texel of any size out, some at a time, for the filter `area`. A texel may come
   /// several times. Returns the sum of their weights.
   double stream(int face, glm::dvec2 low, glm::dvec2 high,
@@ -61,6 +64,7 @@ class IrregularTexels {
   std::optional<Quad> quad_on_face(const Corners& corners) const;
   double texels_across(int face, glm::dvec2 low, glm::dvec2 high) const;
   void start(Content content);
+  void take_part(double share);
   void add(const TexelPlace& texel, double weight);
   static void merge(std::vector<Tap>& taps);
   void gather(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, int depth);

@@ -1,6 +1,7 @@
 #include "mirrorbake/envmap/resample.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -110,33 +111,127 @@ class TapApplication {
         result_(result) {}
 
   void apply(const TapChunk& chunk) {
-    taps_.resize(chunk.weights.size());
-    targets_.resize(chunk.target_rows.size());
     for (const SharedSymmetry& symmetry : symmetries_) {
-      const std::uint32_t last = number_taps(chunk, symmetry.source);
-      kernels_.number_texels(
-          numbering(job_.target, symmetry.target.faces[static_cast<std::size_t>(chunk.face)]),
-          chunk.target_rows.data(), chunk.target_columns.data(), targets_.size(), targets_.data());
-      kernels_.apply(values_.data(), channels_, taps_.data(), chunk.weights.data(), chunk.groups.data(),
-                     chunk.groups.size(), targets_.data(), last < last_texel_, result_.data());
+      const TexelNumbering targets =
+          numbering(job_.target, symmetry.target.faces[static_cast<std::size_t>(chunk.face)]);
+      apply(chunk.blocks, symmetry.source, targets);
+      apply(chunk.lists, symmetry.source, targets);
     }
     for (const TexelPlace& giant : chunk.giants) apply_giant(giant);
   }
 
  private:
-  // Returns the largest number.
-  std::uint32_t number_taps(const TapChunk& chunk, const TexelMap& map) {
-    if (taps_.empty()) return 0;
-    if (chunk.on_one_face) {
-      return kernels_.number_texels(numbering(job_.source, map.faces[chunk.faces[0]]), chunk.rows.data(),
-                                    chunk.columns.data(), taps_.size(), taps_.data());
+  void apply(const TapChunk::Blocks& blocks, const TexelMap& map, const TexelNumbering& targets) {
+    number(targets, blocks.target_rows, blocks.target_columns, targets_);
+    std::size_t first = 0;
+    const float* weights = blocks.weights.data();
+    for (auto group = blocks.groups.begin(); group != blocks.groups.end();) {
+      const auto same_face = [&](const BlockGroup& other) { return other.face == group->face; };
+      const auto end = std::find_if_not(group, blocks.groups.end(), same_face);
+      std::uint32_t count = 0;
+      for (auto other = group; other != end; ++other) count += other->targets;
+      const FaceMap& face = map.faces[static_cast<std::size_t>(group->face)];
+      const TexelNumbering texels = numbering(job_.source, face);
+      texels_.resize(count);
+      const std::uint32_t last = kernels_.number_texels(texels, blocks.rows.data() + first,
+                                                        blocks.columns.data() + first, count, texels_.data());
+      const BlockSteps steps{static_cast<std::int32_t>(texels.per_row),
+                             static_cast<std::int32_t>(texels.per_column)};
+      const bool crosses = crosses_seam(face, blocks.left, blocks.right);
+      const std::uint32_t* texel = texels_.data();
+      for (; group != end; ++group) {
+        if (crosses) {
+          apply_around_seam(*group, blocks, first, face, steps, last, texel, weights);
+        } else {
+          apply_blocks(*group, steps, last, texel, weights, targets_.data() + first);
+        }
+        first += group->targets;
+        texel += group->targets;
+        weights += static_cast<std::size_t>(group->targets) * group->rows * group->columns;
+      }
     }
+  }
+
+  // `last`: the largest of `texels`.
+  void apply_blocks(const BlockGroup& group, const BlockSteps& steps, std::uint32_t last,
+                    const std::uint32_t* texels, const float* weights, const std::uint32_t* targets) {
+    const std::int64_t reach = static_cast<std::int64_t>(std::max(steps.per_row, 0)) * (group.rows - 1) +
+                               static_cast<std::int64_t>(std::max(steps.per_column, 0)) * (group.columns - 1);
+    kernels_.apply_blocks(values_.data(), channels_, group, steps, texels, weights, targets,
+                          last + reach < last_texel_, result_.data());
+  }
+
+  // Whether columns of a panorama, from left to right, lie on both sides of its seam after a symmetry.
+  bool crosses_seam(const FaceMap& map, int left, int right) const {
+    if (!job_.is_periodic()) return false;
+    const auto turn = [&](int column) {
+      const int x = map.column_per_column * column + map.column_offset;
+      return (x >= 0 ? x : x - job_.width() + 1) / job_.width();
+    };
+    return turn(left) != turn(right - 1);
+  }
+
+  // Blocks that lie across the seam, texel by texel.
+  void apply_around_seam(const BlockGroup& group, const TapChunk::Blocks& blocks, std::size_t first,
+                         const FaceMap& face, const BlockSteps& steps, std::uint32_t last,
+                         const std::uint32_t* texels, const float* weights) {
+    const TexelNumbering numbers = numbering(job_.source, face);
+    const std::size_t taps = static_cast<std::size_t>(group.rows) * group.columns;
+    const auto crosses = [&](std::uint32_t i) {
+      const int left = blocks.columns[first + i];
+      return crosses_seam(face, left, left + static_cast<int>(group.columns));
+    };
+    for (std::uint32_t i = 0; i < group.targets;) {
+      BlockGroup part = group;
+      part.targets = 0;
+      while (i + part.targets < group.targets && !crosses(i + part.targets)) ++part.targets;
+      apply_blocks(part, steps, last, texels + i, weights + i * taps, targets_.data() + first + i);
+      i += part.targets;
+      const std::uint32_t begin = i;
+      taps_.clear();
+      for (; i < group.targets && crosses(i); ++i) {
+        for (std::uint32_t k = 0; k < taps; ++k) {
+          const int column = blocks.columns[first + i] + static_cast<int>(k % group.columns);
+          taps_.push_back(number(numbers, blocks.rows[first + i] + static_cast<int>(k / group.columns),
+                                 column < job_.width() ? column : column - job_.width()));
+        }
+      }
+      counts_.assign(i - begin, static_cast<std::uint32_t>(taps));
+      apply_taps(counts_, weights + begin * taps, targets_.data() + first + begin);
+    }
+  }
+
+  void apply(const TapChunk::Lists& lists, const TexelMap& map, const TexelNumbering& targets) {
+    if (lists.counts.empty()) return;
+    std::array<TexelNumbering, 6> numbers;
+    for (std::size_t face = 0; face < 6; ++face) numbers[face] = numbering(job_.source, map.faces[face]);
+    taps_.clear();
+    for (const TexelPlace& texel : lists.texels) {
+      taps_.push_back(number(numbers[static_cast<std::size_t>(texel.face)], texel.row, texel.column));
+    }
+    number(targets, lists.target_rows, lists.target_columns, targets_);
+    apply_taps(lists.counts, lists.weights.data(), targets_.data());
+  }
+
+  // Of taps_.
+  void apply_taps(std::span<const std::uint32_t> counts, const float* weights, const std::uint32_t* targets) {
     std::uint32_t last = 0;
-    for (std::size_t i = 0; i < taps_.size(); ++i) {
-      taps_[i] = number(job_.source, map({chunk.faces[i], chunk.rows[i], chunk.columns[i]}));
-      last = std::max(last, taps_[i]);
-    }
-    return last;
+    for (const std::uint32_t tap : taps_) last = std::max(last, tap);
+    kernels_.apply_taps(values_.data(), channels_, taps_.data(), weights, counts.data(), counts.size(), targets,
+                        last < last_texel_, result_.data());
+  }
+
+  static std::uint32_t number(const TexelNumbering& n, int row, int column) {
+    const int at = n.column_per_row * row + n.column_per_column * column + n.column_offset;
+    const int turn = at < 0 ? n.width : at >= n.width ? -n.width : 0;
+    return n.first + n.per_row * static_cast<std::uint32_t>(row) +
+           n.per_column * static_cast<std::uint32_t>(column) + static_cast<std::uint32_t>(turn);
+  }
+
+  void number(const TexelNumbering& numbering, const std::vector<std::uint16_t>& rows,
+              const std::vector<std::uint16_t>& columns, std::vector<std::uint32_t>& numbers) {
+    numbers.resize(rows.size());
+    kernels_.number_texels(numbering, rows.data(), columns.data(), rows.size(), numbers.data());
   }
 
   static std::uint32_t number(const EnvMapLayout& layout, const TexelPlace& texel) {
@@ -184,7 +279,7 @@ class TapApplication {
   const int channels_;
   const std::uint32_t last_texel_;
   const std::span<float> result_;
-  std::vector<std::uint32_t> taps_, targets_;
+  std::vector<std::uint32_t> texels_, taps_, targets_, counts_;
   std::optional<IrregularTexels> irregular_;
 };
 

@@ -33,6 +33,11 @@ struct ResampleJob {
     return is_periodic() ? std::span<const double>(weights) : std::span<const double>();
   }
 
+  TexelWeights texel_weights() const {
+    const double* table = weights.empty() ? nullptr : weights.data();
+    return {is_periodic() ? table : nullptr, is_periodic() ? nullptr : table, density};
+  }
+
   /// Of a point of a face of the source, in texels from its top left corner.
   glm::dvec2 position(double x, double y) const {
     return {0.5 * (x + 1.0) * width(), 0.5 * (1.0 - y) * height()};

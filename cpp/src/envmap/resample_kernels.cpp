@@ -1,6 +1,8 @@
 // Compiled once per instruction set (mirrorbake_add_isa_sources): MIRRORBAKE_ISA names the level.
 #include "resample_kernels.hpp"
 
+#include "block_weights.hpp"
+
 // How vectors are passed differs between instruction sets, but none is passed beyond this file.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
@@ -157,42 +159,42 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
   return all;
 }
 
-// Σ (−z)^k / (2k + 1)! is sin(√z)/√z, and z ≤ 2π² on an angular map's square: what is left out is below 1e-11.
-inline float sine_quotient(float z2) {
-  const double z = static_cast<double>(z2);
-  double p = 1.0;
-  for (int k = 13; k > 0; --k) p = 1.0 - z * p / (2.0 * k * (2.0 * k + 1.0));
-  return static_cast<float>(magnitude(p));
+inline double least(double a, double b, double c, double d) {
+  const double e = a < b ? a : b;
+  const double f = c < d ? c : d;
+  return e < f ? e : f;
+}
+inline double greatest(double a, double b, double c, double d) { return -least(-a, -b, -c, -d); }
+
+inline std::int32_t floor_of(double v) {
+  const std::int32_t i = static_cast<std::int32_t>(v);
+  return static_cast<double>(i) > v ? i - 1 : i;
 }
 
-void multiply_density(const TexelDensity& density, const std::uint16_t* __restrict rows,
-                      const std::uint16_t* __restrict columns, std::size_t count, float* __restrict weights) {
-  const float per_column = 2.0F / static_cast<float>(density.width);
-  const float per_row = 2.0F / static_cast<float>(density.height);
-  const auto radius2 = [&](std::size_t i) {
-    const float x = (static_cast<float>(columns[i]) + 0.5F) * per_column - 1.0F;
-    const float y = (static_cast<float>(rows[i]) + 0.5F) * per_row - 1.0F;
-    return x * x + y * y;
-  };
-  switch (density.kind) {
-    case TexelDensity::equal: return;
-    case TexelDensity::cube:
-      for (std::size_t i = 0; i < count; ++i) {
-        const float q = 1.0F + radius2(i);
-        weights[i] /= q * __builtin_sqrtf(q);
-      }
-      return;
-    case TexelDensity::paraboloid:
-      for (std::size_t i = 0; i < count; ++i) {
-        const float q = 1.0F + radius2(i);
-        weights[i] /= q * q;
-      }
-      return;
-    case TexelDensity::fisheye: {
-      const float square = static_cast<float>(density.half_angle * density.half_angle);
-      for (std::size_t i = 0; i < count; ++i) weights[i] *= sine_quotient(square * radius2(i));
-      return;
-    }
+// Of pixels, or of the corners of cells with texels' centres for corners. Edges that rounding has put a bit beyond a
+// side do not count.
+void find_boxes(const PositionArrays& above, const PositionArrays& below, const std::uint8_t* __restrict kinds,
+                std::size_t count, const BoxArrays& boxes) {
+  constexpr double kRounding = 1e-9;
+  const double* __restrict ax = above.x;
+  const double* __restrict ay = above.y;
+  const double* __restrict bx = below.x;
+  const double* __restrict by = below.y;
+  std::int32_t* __restrict left = boxes.left;
+  std::int32_t* __restrict top = boxes.top;
+  std::int32_t* __restrict columns = boxes.columns;
+  std::int32_t* __restrict rows = boxes.rows;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double offset = kinds[i] & kInterpolate ? 0.5 : 0.0;
+    const std::int32_t more = kinds[i] & kInterpolate ? 1 : 0;
+    const double inset = kRounding - offset;
+    const double outset = kRounding + offset;
+    left[i] = floor_of(least(ax[i], ax[i + 1], bx[i], bx[i + 1]) + inset);
+    top[i] = floor_of(least(ay[i], ay[i + 1], by[i], by[i + 1]) + inset);
+    const std::int32_t right = floor_of(greatest(ax[i], ax[i + 1], bx[i], bx[i + 1]) - outset) + 1 + more;
+    const std::int32_t bottom = floor_of(greatest(ay[i], ay[i + 1], by[i], by[i + 1]) - outset) + 1 + more;
+    columns[i] = right > left[i] + more ? right - left[i] : 1 + more;
+    rows[i] = bottom > top[i] + more ? bottom - top[i] : 1 + more;
   }
 }
 
@@ -233,6 +235,8 @@ template <>
 struct Lanes<1> {
   typedef float Floats;
   typedef double Doubles;
+  typedef bool Flags;
+  static bool any(Flags v) { return v; }
   static Floats read(const float* from) { return *from; }
   static Doubles widen(Floats v) { return static_cast<double>(v); }
   static Floats narrow(Doubles v) { return static_cast<float>(v); }
@@ -243,6 +247,8 @@ template <>
 struct Lanes<4> {
   typedef FourFloats Floats;
   typedef FourDoubles Doubles;
+  typedef std::int32_t Flags __attribute__((vector_size(16)));
+  static bool any(Flags v) { return (v[0] | v[1] | v[2] | v[3]) != 0; }
   static Floats read(const float* from) { return load(from); }
   static Doubles widen(Floats v) { return __builtin_convertvector(v, FourDoubles); }
   static Floats narrow(const Doubles& v) { return __builtin_convertvector(v, FourFloats); }
@@ -259,91 +265,150 @@ struct Lanes<3> : Lanes<4> {
   }
 };
 
-// `kStride` 0 and `kTaps` 0: known at run time only.
-template <int kValues, int kStride, std::uint32_t kTaps>
-void apply_group(const float* __restrict values, std::size_t stride_, const std::uint32_t* __restrict taps,
-                 const float* __restrict weights, TapGroup group, const std::uint32_t* __restrict targets,
+template <typename L>
+struct Block {
+  const float* from;
+  std::ptrdiff_t row_step;
+  std::ptrdiff_t column_step;
+  std::uint32_t rows;
+  std::uint32_t columns;
+};
+
+// `kColumns` 0: known at run time only.
+template <typename L, std::uint32_t kColumns, bool kSkipZeros>
+inline typename L::Floats block_sum(const Block<L>& block, const float* weights) {
+  const std::uint32_t columns = kColumns > 0 ? kColumns : block.columns;
+  const float* from = block.from;
+  typename L::Floats sum = {};
+  const auto add_row = [&] {
+    const float* texel = from;
+    if constexpr (kColumns > 0) {
+#pragma GCC unroll 8
+      for (std::uint32_t c = 0; c < kColumns; ++c, texel += block.column_step) {
+        if (!kSkipZeros || weights[c] != 0.0F) sum += weights[c] * L::read(texel);
+      }
+    } else {
+      for (std::uint32_t c = 0; c < columns; ++c, texel += block.column_step) {
+        if (!kSkipZeros || weights[c] != 0.0F) sum += weights[c] * L::read(texel);
+      }
+    }
+    weights += columns;
+    from += block.row_step;
+  };
+  if (block.rows * columns <= kFloatTaps) {
+    for (std::uint32_t r = 0; r < block.rows; ++r) add_row();
+    return sum;
+  }
+  typename L::Doubles whole = {};
+  for (std::uint32_t r = 0; r < block.rows; ++r) {
+    sum = typename L::Floats{};
+    add_row();
+    whole += L::widen(sum);
+  }
+  return L::narrow(whole);
+}
+
+// `kStride` 0: known at run time only. Returns whether a sum is not a number: texels that are not finite spoil sums
+// even if their weight is 0.
+template <int kValues, int kStride, std::uint32_t kColumns, bool kSkipZeros>
+bool apply_group(const float* __restrict values, std::size_t stride_, const BlockGroup& group,
+                 const BlockSteps& steps, const std::uint32_t* __restrict texels,
+                 const float* __restrict weights, const std::uint32_t* __restrict targets,
                  float* __restrict result) {
   typedef Lanes<kValues> L;
   const std::size_t stride = kStride > 0 ? kStride : stride_;
-  for (std::uint32_t i = 0; i < group.targets; ++i) {
-    typename L::Floats sum = {};
-    if constexpr (kTaps > 0) {
-#pragma GCC unroll 16
-      for (std::uint32_t k = 0; k < kTaps; ++k) sum += weights[k] * L::read(values + taps[k] * stride);
-      taps += kTaps;
-      weights += kTaps;
-    } else if (group.taps <= kFloatTaps) {
-      for (std::uint32_t k = 0; k < group.taps; ++k) sum += weights[k] * L::read(values + taps[k] * stride);
-      taps += group.taps;
-      weights += group.taps;
-    } else {
-      typename L::Doubles whole = {};
-      for (std::uint32_t k = 0; k < group.taps; k += kFloatTaps) {
-        const std::uint32_t rest = group.taps - k;
-        const std::uint32_t end = rest < kFloatTaps ? rest : kFloatTaps;
-        typename L::Floats part = {};
-        for (std::uint32_t j = 0; j < end; ++j) part += weights[j] * L::read(values + taps[j] * stride);
-        whole += L::widen(part);
-        taps += end;
-        weights += end;
-      }
-      sum = L::narrow(whole);
-    }
+  Block<L> block = {nullptr, steps.per_row * static_cast<std::ptrdiff_t>(stride),
+                    steps.per_column * static_cast<std::ptrdiff_t>(stride), group.rows, group.columns};
+  const std::size_t taps = static_cast<std::size_t>(group.rows) * group.columns;
+  typename L::Flags spoilt = {};
+  for (std::uint32_t i = 0; i < group.targets; ++i, weights += taps) {
+    block.from = values + texels[i] * stride;
+    const typename L::Floats sum = block_sum<L, kColumns, kSkipZeros>(block, weights);
+    spoilt |= sum != sum;
     L::write(result + targets[i] * stride, sum);
   }
+  return L::any(spoilt);
 }
 
 template <int kValues, int kStride>
-void apply_groups(const float* values, std::size_t stride, const std::uint32_t* taps, const float* weights,
-                  const TapGroup* groups, std::size_t group_count, const std::uint32_t* targets,
-                  float* result) {
-  typedef void (*Apply)(const float*, std::size_t, const std::uint32_t*, const float*, TapGroup,
-                        const std::uint32_t*, float*);
+void apply_blocks_of(const float* values, std::size_t stride, const BlockGroup& group,
+                     const BlockSteps& steps, const std::uint32_t* texels, const float* weights,
+                     const std::uint32_t* targets, float* result) {
+  typedef bool (*Apply)(const float*, std::size_t, const BlockGroup&, const BlockSteps&, const std::uint32_t*,
+                        const float*, const std::uint32_t*, float*);
   static constexpr Apply kApply[] = {
-      apply_group<kValues, kStride, 0>,  apply_group<kValues, kStride, 1>,  apply_group<kValues, kStride, 2>,
-      apply_group<kValues, kStride, 3>,  apply_group<kValues, kStride, 4>,  apply_group<kValues, kStride, 5>,
-      apply_group<kValues, kStride, 6>,  apply_group<kValues, kStride, 7>,  apply_group<kValues, kStride, 8>,
-      apply_group<kValues, kStride, 9>,  apply_group<kValues, kStride, 10>, apply_group<kValues, kStride, 11>,
-      apply_group<kValues, kStride, 12>, apply_group<kValues, kStride, 13>, apply_group<kValues, kStride, 14>,
-      apply_group<kValues, kStride, 15>, apply_group<kValues, kStride, 16>};
+      apply_group<kValues, kStride, 0, false>, apply_group<kValues, kStride, 1, false>,
+      apply_group<kValues, kStride, 2, false>, apply_group<kValues, kStride, 3, false>,
+      apply_group<kValues, kStride, 4, false>, apply_group<kValues, kStride, 5, false>,
+      apply_group<kValues, kStride, 6, false>, apply_group<kValues, kStride, 7, false>,
+      apply_group<kValues, kStride, 8, false>};
   constexpr std::uint32_t kMost = sizeof(kApply) / sizeof(kApply[0]);
-  for (std::size_t g = 0; g < group_count; ++g) {
-    const TapGroup group = groups[g];
-    kApply[group.taps < kMost ? group.taps : 0](values, stride, taps, weights, group, targets, result);
-    const std::size_t count = static_cast<std::size_t>(group.taps) * group.targets;
-    taps += count;
-    weights += count;
-    targets += group.targets;
+  const Apply apply = kApply[group.columns < kMost ? group.columns : 0];
+  if (apply(values, stride, group, steps, texels, weights, targets, result)) {
+    apply_group<kValues, kStride, 0, true>(values, stride, group, steps, texels, weights, targets, result);
   }
 }
 
-void apply(const float* values, int channels, const std::uint32_t* taps, const float* weights,
-           const TapGroup* groups, std::size_t group_count, const std::uint32_t* targets, bool may_read_past,
-           float* result) {
+template <int kValues>
+void apply_taps_of(const float* __restrict values, std::size_t stride, const std::uint32_t* __restrict taps,
+                   const float* __restrict weights, const std::uint32_t* __restrict counts,
+                   std::size_t target_count, const std::uint32_t* __restrict targets,
+                   float* __restrict result) {
+  typedef Lanes<kValues> L;
+  for (std::size_t i = 0; i < target_count; ++i) {
+    typename L::Doubles whole = {};
+    for (std::uint32_t k = 0; k < counts[i]; k += kFloatTaps) {
+      const std::uint32_t rest = counts[i] - k;
+      const std::uint32_t end = rest < kFloatTaps ? rest : kFloatTaps;
+      typename L::Floats part = {};
+      for (std::uint32_t j = 0; j < end; ++j) part += weights[j] * L::read(values + taps[j] * stride);
+      whole += L::widen(part);
+      taps += end;
+      weights += end;
+    }
+    L::write(result + targets[i] * stride, L::narrow(whole));
+  }
+}
+
+void apply_blocks(const float* values, int channels, const BlockGroup& group, const BlockSteps& steps,
+                  const std::uint32_t* texels, const float* weights, const std::uint32_t* targets,
+                  bool may_read_past, float* result) {
   const std::size_t stride = static_cast<std::size_t>(channels);
-  if (channels == 1) {
-    return apply_groups<1, 1>(values, stride, taps, weights, groups, group_count, targets, result);
-  }
+  if (channels == 1) return apply_blocks_of<1, 1>(values, stride, group, steps, texels, weights, targets, result);
   if (channels == 3 && may_read_past) {
-    return apply_groups<3, 3>(values, stride, taps, weights, groups, group_count, targets, result);
+    return apply_blocks_of<3, 3>(values, stride, group, steps, texels, weights, targets, result);
   }
-  if (channels == 4) {
-    return apply_groups<4, 4>(values, stride, taps, weights, groups, group_count, targets, result);
+  if (channels == 4) return apply_blocks_of<4, 4>(values, stride, group, steps, texels, weights, targets, result);
+  int first = 0;
+  for (; first + 4 <= channels; first += 4) {
+    apply_blocks_of<4, 0>(values + first, stride, group, steps, texels, weights, targets, result + first);
+  }
+  for (; first < channels; ++first) {
+    apply_blocks_of<1, 0>(values + first, stride, group, steps, texels, weights, targets, result + first);
+  }
+}
+
+void apply_taps(const float* values, int channels, const std::uint32_t* taps, const float* weights,
+                const std::uint32_t* counts, std::size_t target_count, const std::uint32_t* targets,
+                bool may_read_past, float* result) {
+  const std::size_t stride = static_cast<std::size_t>(channels);
+  if (channels == 3 && may_read_past) {
+    return apply_taps_of<3>(values, stride, taps, weights, counts, target_count, targets, result);
   }
   int first = 0;
   for (; first + 4 <= channels; first += 4) {
-    apply_groups<4, 0>(values + first, stride, taps, weights, groups, group_count, targets, result + first);
+    apply_taps_of<4>(values + first, stride, taps, weights, counts, target_count, targets, result + first);
   }
   for (; first < channels; ++first) {
-    apply_groups<1, 0>(values + first, stride, taps, weights, groups, group_count, targets, result + first);
+    apply_taps_of<1>(values + first, stride, taps, weights, counts, target_count, targets, result + first);
   }
 }
 
 }  // namespace
 
 extern const ResampleKernels kResampleKernels = {
-    latlong_positions, cube_positions, dual_paraboloid_positions, classify, multiply_density,
-    number_texels,     apply};
+    latlong_positions, cube_positions, dual_paraboloid_positions,
+    classify,          find_boxes,     find_weights,
+    number_texels,     apply_blocks,   apply_taps};
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

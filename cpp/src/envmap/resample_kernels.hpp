@@ -50,10 +50,44 @@ struct TexelNumbering {
   std::int32_t width;
 };
 
-/// Targets of equally many taps, one after the other.
-struct TapGroup {
-  std::uint32_t taps;
+/// Targets that are each made from a rectangle of texels of one face, of the same size for all.
+struct BlockGroup {
+  std::int32_t face;  ///< of the source
+  std::uint32_t rows;
+  std::uint32_t columns;
   std::uint32_t targets;
+};
+constexpr std::size_t kMostBlockTaps = 256;
+
+/// From a texel of the source to the one below and to the one on the right, after a symmetry: what to add to
+/// the texel's number.
+struct BlockSteps {
+  std::int32_t per_row;
+  std::int32_t per_column;
+};
+
+/// Texels of a tile and their images in the source, each by the number of its corner above left; `pitch` is the
+/// number of corners in a row.
+struct TileImages {
+  PositionArrays corners;
+  std::size_t pitch;
+  const float* shares;  ///< of interpolation
+};
+
+/// The rectangle of texels of the source that a texel of the target reads, by the same numbers. Rows and
+/// columns may lie beyond the face.
+struct BoxArrays {
+  std::int32_t* left;
+  std::int32_t* top;
+  std::int32_t* columns;
+  std::int32_t* rows;
+};
+
+/// Solid angles of the texels of a face, up to a factor: by row or by texel, row by row, if either is not null.
+struct TexelWeights {
+  const double* by_row;
+  const double* by_texel;
+  TexelDensity density;
 };
 
 /// Where directions of any length > 0, one array per component, lie in a map.
@@ -71,20 +105,32 @@ struct ResampleKernels {
   std::uint8_t (*classify)(const PositionArrays& above, const PositionArrays& below, std::size_t count,
                            const StraightLimits& limits, bool automatic, std::uint8_t* kinds, float* shares);
 
-  /// Multiplies weights by the density of their texels.
-  void (*multiply_density)(const TexelDensity& density, const std::uint16_t* rows,
-                           const std::uint16_t* columns, std::size_t count, float* weights);
+  /// Boxes of a row of texels that are not irregular.
+  void (*find_boxes)(const PositionArrays& above, const PositionArrays& below, const std::uint8_t* kinds,
+                     std::size_t count, const BoxArrays& boxes);
+
+  /// Weights of the `rows` × `columns` texels in the boxes of some texels of one kind, one texel after the other:
+  /// each texel's add up to 1. Every box has to lie on the face, but for columns of a panorama.
+  void (*find_weights)(const TileImages& tile, const BoxArrays& boxes, const TexelWeights& source,
+                       std::uint8_t kind, const std::uint32_t* texels, std::size_t count, std::uint32_t rows,
+                       std::uint32_t columns, float* weights);
 
   /// Numbers of texels. Returns the largest.
   std::uint32_t (*number_texels)(const TexelNumbering& numbering, const std::uint16_t* rows,
                                  const std::uint16_t* columns, std::size_t count, std::uint32_t* numbers);
 
-  /// result[targets[i]] = Σ weight · values[tap] of target i's taps, groups of targets one after the other.
-  /// Sums are taken in float, in order, and those of 32 taps each in double. `may_read_past` allows to read
-  /// one value past those of a texel.
-  void (*apply)(const float* values, int channels, const std::uint32_t* taps, const float* weights,
-                const TapGroup* groups, std::size_t group_count, const std::uint32_t* targets,
-                bool may_read_past, float* result);
+  /// result[targets[i]] = Σ weight · value of the texels of block i, whose first one is texels[i]. Sums are
+  /// taken in float; of more than 32 texels row by row, and those of rows in double. Texels of no weight are not
+  /// looked at if they are not finite. `may_read_past` allows to read one value past those of a texel.
+  void (*apply_blocks)(const float* values, int channels, const BlockGroup& group, const BlockSteps& steps,
+                       const std::uint32_t* texels, const float* weights, const std::uint32_t* targets,
+                       bool may_read_past, float* result);
+
+  /// result[targets[i]] = Σ weight · values[tap] of target i's counts[i] taps, targets one after the other.
+  /// Sums are taken in float, in order, and those of 32 taps each in double.
+  void (*apply_taps)(const float* values, int channels, const std::uint32_t* taps, const float* weights,
+                     const std::uint32_t* counts, std::size_t target_count, const std::uint32_t* targets,
+                     bool may_read_past, float* result);
 };
 
 /// The loops for active_isa().

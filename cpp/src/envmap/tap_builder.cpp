@@ -56,21 +56,17 @@ LineTables line_tables(const ResampleJob& job) {
 }
 
 std::size_t TapChunk::bytes() const {
-  return (target_rows.size() + target_columns.size() + rows.size() + columns.size()) * sizeof(std::uint16_t) +
-         groups.size() * sizeof(TapGroup) + faces.size() + weights.size() * sizeof(float) +
-         giants.size() * sizeof(TexelPlace);
+  const auto size = [](const auto& vector) { return vector.size() * sizeof(vector[0]); };
+  return size(blocks.groups) + size(blocks.target_rows) + size(blocks.target_columns) + size(blocks.rows) +
+         size(blocks.columns) + size(blocks.weights) + size(lists.target_rows) + size(lists.target_columns) +
+         size(lists.counts) + size(lists.texels) + size(lists.weights) + size(giants);
 }
 
 void TapChunk::clear() {
-  target_rows.clear();
-  target_columns.clear();
-  groups.clear();
-  faces.clear();
-  rows.clear();
-  columns.clear();
-  weights.clear();
-  giants.clear();
-  on_one_face = true;
+  const auto empty = [](auto&... vectors) { (vectors.clear(), ...); };
+  empty(blocks.groups, blocks.target_rows, blocks.target_columns, blocks.rows, blocks.columns,
+        blocks.weights, lists.target_rows, lists.target_columns, lists.counts, lists.texels, lists.weights,
+        giants);
 }
 
 bool may_have_first_texels(const Tile& tile, std::span<const SharedSymmetry> symmetries) {
@@ -86,45 +82,37 @@ TapBuilder::TapBuilder(const ResampleJob& job, const LineTables& lines,
       symmetries_(symmetries),
       limits_(straight_limits(job.source)),
       lookup_(job, lines),
-      irregular_(job),
-      interpolated_(job.row_weights()) {}
+      irregular_(job) {}
 
 void TapBuilder::build(const Tile& tile, TapChunk& chunk) {
   chunk.clear();
   chunk.face = tile.face;
   if (!select_first_texels(tile)) return;
+  const std::size_t size = corner(tile_.rows + 1, 0);
+  kinds_.resize(size);
+  shares_.resize(size);
+  for (std::vector<std::int32_t>* box : {&left_, &top_, &columns_, &rows_}) box->resize(size);
+  positions_.resize(size);
   if (looks_at_centers(job_.filter)) {
-    add_by_center();
-    move_pending(chunk);
-    return;
+    find_centers();
+  } else {
+    find_corners();
+    classify();
   }
-  find_corners();
-  classify();
-  for (int row = 0; row < tile_.rows; ++row) {
-    for (int column = 0; column < tile_.columns; ++column) {
-      if (kinds_[texel(row, column)] == kArea) add_area(row, column);
-    }
-  }
-  move_pending(chunk);
-  weigh(chunk);
-  for (int row = 0; row < tile_.rows; ++row) {
-    for (int column = 0; column < tile_.columns; ++column) {
-      const std::uint8_t kind = kinds_[texel(row, column)];
-      if (kind == kIrregular) {
-        add_irregular(row, column, chunk);
-      } else if (kind & kInterpolate) {
-        add_mixed(row, column);
-      }
-    }
-  }
-  move_pending(chunk);
+  find_blocks(chunk);
+  sort_blocks();
+  add_blocks(chunk.blocks);
 }
 
 // Marks the texels that no symmetry takes to one before them, and sets the present tile to the rectangle
 // around them.
 bool TapBuilder::select_first_texels(const Tile& tile) {
   tile_ = tile;
-  first_.assign(texel(tile.rows, 0), 1);
+  first_.assign(static_cast<std::size_t>(tile.rows) * static_cast<std::size_t>(tile.columns), 1);
+  const auto texel = [&](int row, int column) {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(tile.columns) +
+           static_cast<std::size_t>(column);
+  };
   for (const SharedSymmetry& symmetry : symmetries_) {
     const TexelMap& map = symmetry.target;
     const Order order = order_of_image(tile, map);
@@ -167,16 +155,15 @@ glm::dvec2 TapBuilder::target_corner(int row, int column) const {
           1.0 - 2.0 * (tile_.row + row) / job_.target.height};
 }
 
-Quad TapBuilder::quad(int row, int column) const {
-  const std::size_t a = corner(row, column);
-  const std::size_t b = corner(row + 1, column);
+Quad TapBuilder::quad(std::size_t texel) const {
+  const std::size_t a = texel;
+  const std::size_t b = texel + corner(1, 0);
   const std::vector<double>& x = positions_.x;
   const std::vector<double>& y = positions_.y;
   return {glm::dvec2(x[a], y[a]), {x[a + 1], y[a + 1]}, {x[b + 1], y[b + 1]}, {x[b], y[b]}};
 }
 
 void TapBuilder::find_corners() {
-  positions_.resize(corner(tile_.rows + 1, 0));
   for (int row = 0; row <= tile_.rows; ++row) {
     lookup_.find(tile_.face, target_corner(row, 0).y, tile_.column,
                  static_cast<std::size_t>(tile_.columns) + 1, positions_, corner(row, 0));
@@ -197,232 +184,168 @@ void TapBuilder::find_corners() {
 
 void TapBuilder::classify() {
   const std::size_t columns = static_cast<std::size_t>(tile_.columns);
-  kinds_.resize(texel(tile_.rows, 0));
-  shares_.resize(kinds_.size());
   const ProjectionKind kind = job_.target.projection.kind;
   const bool round = kind != ProjectionKind::cube && kind != ProjectionKind::latlong;
   for (int row = 0; row < tile_.rows; ++row) {
-    std::uint8_t* kinds = kinds_.data() + texel(row, 0);
-    kernels_.classify(positions_.from(corner(row, 0)), positions_.from(corner(row + 1, 0)), columns, limits_,
-                      job_.filter == ResampleFilter::automatic, kinds, shares_.data() + texel(row, 0));
-    for (int column = 0; column < tile_.columns; ++column) {
-      if (!first_[texel(row, column)]) {
-        kinds[column] = 0;
-      } else if (round && disc_extent(kind, target_corner(row, column), target_corner(row + 1, column + 1)) ==
-                              DiscExtent::crosses_rim) {
-        kinds[column] = kIrregular;
+    const std::size_t first = corner(row, 0);
+    const PositionArrays above = positions_.from(first);
+    const PositionArrays below = positions_.from(corner(row + 1, 0));
+    kernels_.classify(above, below, columns, limits_, job_.filter == ResampleFilter::automatic,
+                      kinds_.data() + first, shares_.data() + first);
+    kernels_.find_boxes(above, below, kinds_.data() + first, columns, boxes_from(first));
+    for (int column = 0; column < tile_.columns && round; ++column) {
+      if (disc_extent(kind, target_corner(row, column), target_corner(row + 1, column + 1)) ==
+          DiscExtent::crosses_rim) {
+        kinds_[corner(row, column)] = kIrregular;
       }
     }
   }
 }
 
-void TapBuilder::add_by_center() {
-  positions_.resize(static_cast<std::size_t>(tile_.columns));
-  const auto add = [&](const TexelPlace& place, double weight) { add_tap(place, weight); };
+// A texel of the filter `bilinear` is made from those around its centre, one of `nearest` from that at its centre.
+void TapBuilder::find_centers() {
+  const bool nearest = job_.filter == ResampleFilter::nearest;
   for (int row = 0; row < tile_.rows; ++row) {
     lookup_.find(tile_.face, row_center(tile_.row + row, job_.target.height), tile_.column,
-                 static_cast<std::size_t>(tile_.columns), positions_, 0);
+                 static_cast<std::size_t>(tile_.columns), positions_, corner(row, 0));
     for (int column = 0; column < tile_.columns; ++column) {
-      if (!first_[texel(row, column)]) continue;
-      const std::size_t i = static_cast<std::size_t>(column);
-      const int face = positions_.face[i];
-      if (face >= 0 && job_.filter == ResampleFilter::nearest) {
-        add_tap({face, std::clamp(static_cast<int>(positions_.y[i]), 0, job_.height() - 1),
-                 std::clamp(static_cast<int>(positions_.x[i]), 0, job_.width() - 1)},
-                1.0);
-      } else if (face >= 0 && !add_bilinear(face, positions_.x[i] - 0.5, positions_.y[i] - 0.5)) {
-        emit_bilinear(job_.source, face, positions_.x[i], positions_.y[i], add);
+      const std::size_t i = corner(row, column);
+      if (nearest) {
+        left_[i] = std::min(static_cast<int>(positions_.x[i]), job_.width() - 1);
+        top_[i] = std::min(static_cast<int>(positions_.y[i]), job_.height() - 1);
+      } else {
+        left_[i] = floor_of(positions_.x[i] - 0.5);
+        top_[i] = floor_of(positions_.y[i] - 0.5);
       }
-      end_target(row, column);
+      columns_[i] = rows_[i] = nearest ? 1 : 2;
+      kinds_[i] = positions_.face[i] < 0 ? +kIrregular : +kInterpolate;
     }
   }
 }
 
-// Between the centres of four texels of one face, in texels from the first centre.
-bool TapBuilder::add_bilinear(int face, double x, double y) {
-  const int left = static_cast<int>(x);
-  const int top = static_cast<int>(y);
-  if (!(x >= 0.0) || !(y >= 0.0) || left + 1 >= job_.width() || top + 1 >= job_.height()) return false;
-  const double fx = x - left;
-  const double fy = y - top;
-  reserve_taps(4);
-  PendingTap* tap = taps_.data() + tap_count_;
-  const auto add = [&](int row, int column, double weight) {
-    *tap++ = {narrow(row), narrow(column), static_cast<std::uint8_t>(face), static_cast<float>(weight)};
+// Whether all of its box is on the face.
+bool TapBuilder::is_block(std::size_t texel) const {
+  if (kinds_[texel] == kIrregular) return false;
+  const std::int32_t rows = rows_[texel];
+  const std::int32_t columns = columns_[texel];
+  constexpr std::int32_t kMost = static_cast<std::int32_t>(kMostBlockTaps);
+  if (rows > kMost || columns > kMost || rows * columns > kMost || columns > job_.width()) return false;
+  if (top_[texel] < 0 || top_[texel] + rows > job_.height()) return false;
+  return job_.is_periodic() || (left_[texel] >= 0 && left_[texel] + columns <= job_.width());
+}
+
+void TapBuilder::find_blocks(TapChunk& chunk) {
+  shapes_.clear();
+  found_.clear();
+  std::size_t shape = 0;
+  const std::uint8_t* first = first_.data();
+  for (int row = 0; row < tile_.rows; ++row) {
+    for (int column = 0; column < tile_.columns; ++column) {
+      if (!*first++) continue;
+      const std::size_t i = corner(row, column);
+      if (!is_block(i)) {
+        add_list(row, column, chunk);
+        continue;
+      }
+      const Shape wanted = {positions_.face[i], rows_[i], columns_[i], kinds_[i]};
+      if (shape == shapes_.size() || !(shapes_[shape] == wanted)) {
+        shape = static_cast<std::size_t>(std::find(shapes_.begin(), shapes_.end(), wanted) - shapes_.begin());
+        if (shape == shapes_.size()) shapes_.push_back(wanted);
+      }
+      ++shapes_[shape].count;
+      found_.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(shape)});
+    }
+  }
+}
+
+void TapBuilder::sort_blocks() {
+  std::uint32_t start = 0;
+  starts_.clear();
+  for (const Shape& shape : shapes_) {
+    starts_.push_back(start);
+    start += shape.count;
+  }
+  sorted_.resize(found_.size());
+  for (const Block& block : found_) sorted_[starts_[block.shape]++] = block.texel;
+}
+
+void TapBuilder::add_blocks(TapChunk::Blocks& blocks) {
+  std::size_t taps = 0;
+  for (const Shape& shape : shapes_) taps += static_cast<std::size_t>(shape.rows * shape.columns) * shape.count;
+  blocks.weights.resize(taps);
+  blocks.left = blocks.right = 0;
+  const std::uint32_t pitch = static_cast<std::uint32_t>(tile_.columns + 1);
+  for (std::size_t k = 0; k < sorted_.size(); ++k) {
+    const std::uint32_t i = sorted_[k];
+    const int right = left_[i] + columns_[i];
+    blocks.left = k == 0 ? left_[i] : std::min(blocks.left, left_[i]);
+    blocks.right = k == 0 ? right : std::max(blocks.right, right);
+    int column = left_[i];
+    if (column < 0) column += job_.width();
+    if (column >= job_.width()) column -= job_.width();
+    blocks.rows.push_back(narrow(top_[i]));
+    blocks.columns.push_back(narrow(column));
+    blocks.target_rows.push_back(narrow(tile_.row + static_cast<int>(i / pitch)));
+    blocks.target_columns.push_back(narrow(tile_.column + static_cast<int>(i % pitch)));
+  }
+  const TileImages tile{positions_.from(0), pitch, shares_.data()};
+  const TexelWeights source = job_.texel_weights();
+  float* weights = blocks.weights.data();
+  const std::uint32_t* texels = sorted_.data();
+  for (const Shape& shape : shapes_) {
+    const BlockGroup group{shape.face, static_cast<std::uint32_t>(shape.rows),
+                           static_cast<std::uint32_t>(shape.columns), shape.count};
+    if (looks_at_centers(job_.filter)) {
+      interpolate_at_centers({texels, shape.count}, weights);
+    } else {
+      kernels_.find_weights(tile, boxes_from(0), source, shape.kind, texels, shape.count, group.rows,
+                            group.columns, weights);
+    }
+    blocks.groups.push_back(group);
+    texels += shape.count;
+    weights += static_cast<std::size_t>(shape.count) * group.rows * group.columns;
+  }
+}
+
+void TapBuilder::interpolate_at_centers(std::span<const std::uint32_t> texels, float* weights) const {
+  for (const std::uint32_t i : texels) {
+    if (job_.filter == ResampleFilter::nearest) {
+      *weights++ = 1.0F;
+      continue;
+    }
+    const double x = positions_.x[i] - 0.5 - left_[i];
+    const double y = positions_.y[i] - 0.5 - top_[i];
+    for (const double down : {1.0 - y, y}) {
+      *weights++ = static_cast<float>((1.0 - x) * down);
+      *weights++ = static_cast<float>(x * down);
+    }
+  }
+}
+
+void TapBuilder::add_list(int row, int column, TapChunk& chunk) {
+  const std::size_t i = corner(row, column);
+  const int face = positions_.face[i];
+  TapChunk::Lists& lists = chunk.lists;
+  const std::size_t before = lists.weights.size();
+  const auto add = [&](const TexelPlace& texel, double weight) {
+    lists.texels.push_back(texel);
+    lists.weights.push_back(static_cast<float>(weight));
   };
-  add(top, left, (1.0 - fx) * (1.0 - fy));
-  add(top, left + 1, fx * (1.0 - fy));
-  add(top + 1, left, (1.0 - fx) * fy);
-  add(top + 1, left + 1, fx * fy);
-  tap_count_ += 4;
-  return true;
-}
-
-void TapBuilder::add_tap(const TexelPlace& texel, double weight) {
-  if (tap_count_ == taps_.size()) reserve_taps(1);
-  taps_[tap_count_++] = {narrow(texel.row), narrow(texel.column), static_cast<std::uint8_t>(texel.face),
-                         static_cast<float>(weight)};
-}
-
-void TapBuilder::reserve_taps(std::size_t count) {
-  if (tap_count_ + count > taps_.size()) taps_.resize(2 * taps_.size() + count + 1024);
-}
-
-void TapBuilder::end_target(int row, int column) {
-  targets_.push_back({narrow(tile_.row + row), narrow(tile_.column + column),
-                      static_cast<std::uint32_t>(tap_count_ - target_begin_)});
-  target_begin_ = tap_count_;
-}
-
-void TapBuilder::add_area(int row, int column) {
-  const int face = positions_.face[corner(row, column)];
-  coverage_.rasterize(quad(row, column));
-  reserve_taps(coverage_.most_pixels());
-  PendingTap* tap = taps_.data() + tap_count_;
-  const int width = job_.width();
-  const int height = job_.height();
-  const bool periodic = job_.is_periodic();
-  const double* weights = job_.weights.empty() ? nullptr : job_.weights.data();
-  coverage_.for_each_pixel([&](int x, int y, double area) {
-    if (y < 0 || y >= height) return;
-    if (periodic) {
-      if (x < 0) x += width;
-      if (x >= width) x -= width;
-      area *= weights[y];
-    } else if (x < 0 || x >= width) {
+  if (looks_at_centers(job_.filter)) {
+    if (face >= 0) emit_bilinear(job_.source, face, positions_.x[i], positions_.y[i], add);
+  } else {
+    const auto taps = kinds_[i] == kIrregular
+                          ? irregular_.find(tile_.face, target_corner(row, column), target_corner(row + 1, column + 1))
+                          : irregular_.find_straight(face, quad(i), static_cast<double>(shares_[i]));
+    if (!taps) {
+      chunk.giants.push_back({tile_.face, tile_.row + row, tile_.column + column});
       return;
-    } else if (weights != nullptr) {
-      area *= weights[static_cast<std::ptrdiff_t>(y) * width + x];
     }
-    *tap++ = {narrow(y), narrow(x), static_cast<std::uint8_t>(face), static_cast<float>(area)};
-  });
-  tap_count_ = static_cast<std::size_t>(tap - taps_.data());
-  if (tap_count_ == target_begin_) {
-    // Far smaller than a texel of the source.
-    const glm::dvec2 at = quad(row, column)[0];
-    add_tap(place_at(job_.source, face, std::clamp(static_cast<int>(at.y), 0, job_.height() - 1),
-                     std::clamp(static_cast<int>(at.x), 0, job_.width() - 1)),
-            1.0);
+    for (const Tap& tap : *taps) add(tap.texel, tap.weight);
   }
-  end_target(row, column);
-}
-
-// Weights of the taps of the filter `area`, which move_pending() has moved first.
-void TapBuilder::weigh(TapChunk& chunk) const {
-  kernels_.multiply_density(job_.density, chunk.rows.data(), chunk.columns.data(), chunk.weights.size(),
-                            chunk.weights.data());
-  float* weights = chunk.weights.data();
-  for (const TapGroup& group : chunk.groups) {
-    for (std::uint32_t i = 0; i < group.targets; ++i, weights += group.taps) {
-      double sum = 0.0;
-      for (std::uint32_t k = 0; k < group.taps; ++k) sum += static_cast<double>(weights[k]);
-      const double scale = 1.0 / sum;
-      for (std::uint32_t k = 0; k < group.taps; ++k) {
-        weights[k] = static_cast<float>(scale * static_cast<double>(weights[k]));
-      }
-    }
-  }
-}
-
-void TapBuilder::add_mixed(int row, int column) {
-  const int face = positions_.face[corner(row, column)];
-  const Quad quad = this->quad(row, column);
-  const double share = static_cast<double>(shares_[texel(row, column)]);
-  interpolated_.integrate(quad);
-  if (!(interpolated_.area() > 0.0)) {
-    emit_bilinear(job_.source, face, quad[0].x, quad[0].y,
-                  [&](const TexelPlace& place, double weight) { add_tap(place, weight); });
-    return end_target(row, column);
-  }
-  interpolated_.scale(share / interpolated_.area());
-  if (share < 1.0) {
-    covered_.clear();
-    double total = 0.0;
-    coverage_.rasterize(quad);
-    coverage_.for_each_pixel([&](int x, int y, double area) {
-      if (y < 0 || y >= job_.height() || (!job_.is_periodic() && (x < 0 || x >= job_.width()))) return;
-      area *= job_.weight(y, x);
-      total += area;
-      covered_.push_back({{face, y, x}, area});
-    });
-    for (const Tap& tap : covered_) {
-      interpolated_.add(tap.texel.column, tap.texel.row, (1.0 - share) / total * tap.weight);
-    }
-  }
-  if (interpolated_.is_within(job_.width(), job_.height())) {
-    reserve_taps(interpolated_.most_texels());
-    PendingTap* tap = taps_.data() + tap_count_;
-    interpolated_.for_each_texel([&](int x, int y, double weight) {
-      *tap++ = {narrow(y), narrow(x), static_cast<std::uint8_t>(face), static_cast<float>(weight)};
-    });
-    tap_count_ = static_cast<std::size_t>(tap - taps_.data());
-    return end_target(row, column);
-  }
-  interpolated_.for_each_texel([&](int x, int y, double weight) {
-    emit_texel(job_.source, face, y, x, weight,
-               [&](const TexelPlace& place, double part) { add_tap(place, part); });
-  });
-  end_target(row, column);
-}
-
-void TapBuilder::add_irregular(int row, int column, TapChunk& chunk) {
-  const auto taps =
-      irregular_.find(tile_.face, target_corner(row, column), target_corner(row + 1, column + 1));
-  if (!taps) {
-    chunk.giants.push_back({tile_.face, tile_.row + row, tile_.column + column});
-    return;
-  }
-  for (const Tap& tap : *taps) add_tap(tap.texel, tap.weight);
-  end_target(row, column);
-}
-
-// In the order of the number of their taps, so that the loops over them run equally long for many at once.
-void TapBuilder::move_pending(TapChunk& chunk) {
-  std::uint32_t most = 0;
-  for (const PendingTarget& target : targets_) most = std::max(most, target.taps);
-  counts_.assign(static_cast<std::size_t>(most) + 1, 0);
-  for (const PendingTarget& target : targets_) ++counts_[target.taps];
-  starts_.assign(counts_.size(), 0);  // of targets
-  std::size_t target_count = chunk.target_rows.size();
-  for (std::size_t n = 0; n < counts_.size(); ++n) {
-    starts_[n] = static_cast<std::uint32_t>(target_count);
-    if (counts_[n] > 0) chunk.groups.push_back({static_cast<std::uint32_t>(n), counts_[n]});
-    target_count += counts_[n];
-  }
-  // Of taps, by the group: where the next target's go.
-  std::size_t tap_count = chunk.weights.size();
-  std::vector<std::size_t>& tap_starts = tap_starts_;
-  tap_starts.assign(counts_.size(), 0);
-  for (std::size_t n = 0; n < counts_.size(); ++n) {
-    tap_starts[n] = tap_count;
-    tap_count += n * counts_[n];
-  }
-  chunk.target_rows.resize(target_count);
-  chunk.target_columns.resize(target_count);
-  chunk.faces.resize(tap_count);
-  chunk.rows.resize(tap_count);
-  chunk.columns.resize(tap_count);
-  chunk.weights.resize(tap_count);
-  const PendingTap* tap = taps_.data();
-  for (const PendingTarget& target : targets_) {
-    const std::size_t i = starts_[target.taps]++;
-    chunk.target_rows[i] = target.row;
-    chunk.target_columns[i] = target.column;
-    std::size_t& to = tap_starts[target.taps];
-    for (std::uint32_t k = 0; k < target.taps; ++k, ++tap, ++to) {
-      chunk.rows[to] = tap->row;
-      chunk.columns[to] = tap->column;
-      chunk.faces[to] = tap->face;
-      chunk.weights[to] = tap->weight;
-      chunk.on_one_face = chunk.on_one_face && tap->face == taps_[0].face;
-    }
-  }
-  if (tap_count_ > 0) {
-    chunk.on_one_face = chunk.on_one_face && chunk.faces[0] == taps_[0].face;
-  }
-  targets_.clear();
-  tap_count_ = 0;
-  target_begin_ = 0;
+  lists.target_rows.push_back(narrow(tile_.row + row));
+  lists.target_columns.push_back(narrow(tile_.column + column));
+  lists.counts.push_back(static_cast<std::uint32_t>(lists.weights.size() - before));
 }
 
 }  // namespace mirrorbake

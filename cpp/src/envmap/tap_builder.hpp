@@ -21,19 +21,30 @@ struct Tile {
 };
 
 /// What texels of the target are made from: sums of weights times texels of the source. Of the texels that
-/// symmetries take to each other it holds the first.
+/// symmetries take to each other it holds the first. Most are made from a rectangle of texels of one face, a
+/// block; others from a list of taps, such as those across the edges of faces.
 struct TapChunk {
+  struct Blocks {
+    std::vector<BlockGroup> groups;  ///< of targets, by face
+    std::vector<std::uint16_t> target_rows;
+    std::vector<std::uint16_t> target_columns;
+    std::vector<std::uint16_t> rows;  ///< of the first texel, and its column, on the face
+    std::vector<std::uint16_t> columns;
+    std::vector<float> weights;  ///< row by row
+    int left = 0;                ///< columns of all blocks, which go on across the seam of a panorama
+    int right = 0;
+  };
+  struct Lists {
+    std::vector<std::uint16_t> target_rows;
+    std::vector<std::uint16_t> target_columns;
+    std::vector<std::uint32_t> counts;
+    std::vector<TexelPlace> texels;
+    std::vector<float> weights;
+  };
+
   int face = 0;  ///< of the target
-  std::vector<std::uint16_t> target_rows;
-  std::vector<std::uint16_t> target_columns;
-  std::vector<TapGroup> groups;  ///< of targets
-
-  std::vector<std::uint8_t> faces;  ///< of taps, and their rows, columns and weights
-  std::vector<std::uint16_t> rows;
-  std::vector<std::uint16_t> columns;
-  std::vector<float> weights;
-  bool on_one_face = true;  ///< whether all `faces` are the same
-
+  Blocks blocks;
+  Lists lists;
   std::vector<TexelPlace> giants;  ///< targets of more taps than are worth keeping: IrregularTexels::stream()
 
   std::size_t bytes() const;
@@ -56,42 +67,44 @@ class TapBuilder {
   void build(const Tile& tile, TapChunk& chunk);
 
  private:
-  struct PendingTap {
-    std::uint16_t row;
-    std::uint16_t column;
-    std::uint8_t face;
-    float weight;
+  // Of blocks of one kind of texel.
+  struct Shape {
+    std::int32_t face;
+    std::int32_t rows;
+    std::int32_t columns;
+    std::uint8_t kind;
+    std::uint32_t count = 0;
+
+    bool operator==(const Shape& other) const {
+      return face == other.face && rows == other.rows && columns == other.columns && kind == other.kind;
+    }
   };
-  struct PendingTarget {
-    std::uint16_t row;
-    std::uint16_t column;
-    std::uint32_t taps;
+  struct Block {
+    std::uint32_t texel;
+    std::uint32_t shape;
   };
 
-  std::size_t texel(int row, int column) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(tile_.columns) +
-           static_cast<std::size_t>(column);
-  }
+  // Texels have the number of their corner above left.
   std::size_t corner(int row, int column) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(tile_.columns + 1) +
            static_cast<std::size_t>(column);
   }
   glm::dvec2 target_corner(int row, int column) const;
-  Quad quad(int row, int column) const;
+  Quad quad(std::size_t texel) const;
+  BoxArrays boxes_from(std::size_t texel) {
+    return {left_.data() + texel, top_.data() + texel, columns_.data() + texel, rows_.data() + texel};
+  }
 
   bool select_first_texels(const Tile& tile);
   void find_corners();
   void classify();
-  void add_by_center();
-  void add_area(int row, int column);
-  void add_mixed(int row, int column);
-  void add_irregular(int row, int column, TapChunk& chunk);
-  bool add_bilinear(int face, double x, double y);
-  void add_tap(const TexelPlace& texel, double weight);
-  void reserve_taps(std::size_t count);
-  void end_target(int row, int column);
-  void move_pending(TapChunk& chunk);
-  void weigh(TapChunk& chunk) const;
+  void find_centers();
+  bool is_block(std::size_t texel) const;
+  void find_blocks(TapChunk& chunk);
+  void sort_blocks();
+  void add_blocks(TapChunk::Blocks& blocks);
+  void interpolate_at_centers(std::span<const std::uint32_t> texels, float* weights) const;
+  void add_list(int row, int column, TapChunk& chunk);
 
   const ResampleJob& job_;
   const ResampleKernels& kernels_;
@@ -99,21 +112,17 @@ class TapBuilder {
   const StraightLimits limits_;
   LineLookup lookup_;
   IrregularTexels irregular_;
-  Coverage coverage_;
-  BilinearMean interpolated_;
 
   Tile tile_;
   std::vector<std::uint8_t> first_;  // of those that symmetries take to each other
-  Positions positions_;              // of corners or centres
+  Positions positions_;              // of corners, or of centres
   std::vector<std::uint8_t> kinds_;
   std::vector<float> shares_;
-  std::vector<Tap> covered_;
-  std::vector<PendingTarget> targets_;
-  std::vector<PendingTap> taps_;  // the first tap_count_
-  std::size_t tap_count_ = 0;
-  std::size_t target_begin_ = 0;
-  std::vector<std::uint32_t> counts_, starts_;
-  std::vector<std::size_t> tap_starts_;
+  std::vector<std::int32_t> left_, top_, columns_, rows_;
+  std::vector<Shape> shapes_;
+  std::vector<Block> found_;
+  std::vector<std::uint32_t> starts_;  // of shapes
+  std::vector<std::uint32_t> sorted_;  // texels, by shape
 };
 
 }  // namespace mirrorbake

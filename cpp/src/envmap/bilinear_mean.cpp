@@ -97,18 +97,18 @@ class EdgeWalk {
 
 }  // namespace
 
-void BilinearMean::integrate(const Quad& quad, glm::dvec2 low, glm::dvec2 high) {
+void BilinearMean::integrate(std::span<const glm::dvec2> corners, glm::dvec2 low, glm::dvec2 high) {
   Polygon polygon;
-  polygon.count = 4;
-  std::copy(quad.begin(), quad.end(), polygon.corners.begin());
+  polygon.count = corners.size();
+  std::copy(corners.begin(), corners.end(), polygon.corners.begin());
   polygon = cut(polygon, 0, low.x, 1.0);
   polygon = cut(polygon, 0, high.x, -1.0);
   polygon = cut(polygon, 1, low.y, 1.0);
   polygon = cut(polygon, 1, high.y, -1.0);
-  integrate_polygon({polygon.corners.data(), polygon.count});
+  integrate(std::span<const glm::dvec2>(polygon.corners.data(), polygon.count));
 }
 
-void BilinearMean::integrate_polygon(std::span<const glm::dvec2> corners) {
+void BilinearMean::integrate(std::span<const glm::dvec2> corners) {
   area_ = 0.0;
   columns_ = rows_ = 0;
   if (corners.size() < 3) return;
@@ -148,7 +148,10 @@ void BilinearMean::integrate_polygon(std::span<const glm::dvec2> corners) {
     }
   }
   // The order of the corners decides the sign.
-  if (area_ < 0.0) scale(-1.0);
+  if (area_ < 0.0) {
+    for (double& weight : weights_) weight = -weight;
+    area_ = -area_;
+  }
 }
 
 // Moments about the first corner, which are then shifted to the corner of the cell.

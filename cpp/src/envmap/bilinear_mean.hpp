@@ -35,29 +35,10 @@ class BilinearMean {
   /// `row_weights`: solid angles of texels by row, which are referred to, or none if they are all alike.
   explicit BilinearMean(std::span<const double> row_weights) : row_weights_(row_weights) {}
 
-  /// Takes a quadrilateral that does not intersect itself, or the part of it between two columns and rows.
-  void integrate(const Quad& quad) { integrate_polygon(quad); }
-  void integrate(const Quad& quad, glm::dvec2 low, glm::dvec2 high);
-
-  /// Integral of 1: the area, or the solid angle.
-  double area() const { return area_; }
-
-  /// Multiplies all weights; adds to that of a texel that the quadrilateral covers a part of.
-  void scale(double factor) {
-    for (double& w : weights_) w *= factor;
-    area_ *= factor;
-  }
-  void add(int column, int row, double weight) {
-    weights_[static_cast<std::size_t>(row - top_) * static_cast<std::size_t>(columns_) +
-             static_cast<std::size_t>(column - left_)] += weight;
-  }
-
-  /// Most texels that for_each_texel() visits.
-  std::size_t most_texels() const { return weights_.size(); }
-  /// Whether all of them are texels of a face.
-  bool is_within(int width, int height) const {
-    return left_ >= 0 && top_ >= 0 && left_ + columns_ <= width && top_ + rows_ <= height;
-  }
+  /// Takes a polygon that does not intersect itself, or the part of one of at most four corners between two columns
+  /// and rows.
+  void integrate(std::span<const glm::dvec2> corners);
+  void integrate(std::span<const glm::dvec2> corners, glm::dvec2 low, glm::dvec2 high);
 
   /// Calls visit(column, row, weight) for the texels with weight; the weights add up to area(). Columns and
   /// rows may be one beyond the face.
@@ -75,7 +56,6 @@ class BilinearMean {
  private:
   static constexpr double kSmallest = 1e-9;  // weight, a rounding error
 
-  void integrate_polygon(std::span<const glm::dvec2> corners);
   Cell cell_of(std::span<const glm::dvec2> corners) const;
   void add_cell(int column, int row, const Cell& cell);
 

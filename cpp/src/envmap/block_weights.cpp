@@ -223,7 +223,8 @@ class Batch {
     for (int corner = 0; corner < 4; ++corner) {
       from_centers[corner] = {corners_[corner].x - 0.5, corners_[corner].y - 0.5};
     }
-    find_interpolation(from_centers, rows, columns, [&](std::uint32_t row) { return row_weight(row); }, weights);
+    find_interpolation(
+        from_centers, rows, columns, [&](std::uint32_t row) { return row_weight(row); }, weights);
     if (kind == kInterpolate) return scale(weights, count, all(1.0));
     Doubles areas[kMostBlockTaps];
     find_area(rows, columns, areas);
@@ -261,7 +262,8 @@ class Batch {
         for (std::uint32_t column = 0; column < columns; ++column, ++weights) {
           for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const std::ptrdiff_t texel =
-                (top_[lane] + row) * static_cast<std::ptrdiff_t>(source_.density.width) + left_[lane] + column;
+                (top_[lane] + row) * static_cast<std::ptrdiff_t>(source_.density.width) + left_[lane] +
+                column;
             (*weights)[lane] *= source_.by_texel[texel];
           }
         }

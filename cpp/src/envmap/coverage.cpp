@@ -3,25 +3,38 @@
 #include <algorithm>
 #include <utility>
 
+#include <glm/common.hpp>
+
 namespace mirrorbake {
 namespace {
 
-double signed_area(const std::array<glm::dvec2, 4>& p) {
-  return 0.5 * ((p[2].x - p[0].x) * (p[3].y - p[1].y) - (p[3].x - p[1].x) * (p[2].y - p[0].y));
+double signed_area(std::span<const glm::dvec2> p) {
+  double area = 0.0;
+  for (std::size_t i = 1; i + 1 < p.size(); ++i) {
+    const glm::dvec2 a = p[i] - p[0];
+    const glm::dvec2 b = p[i + 1] - p[0];
+    area += a.x * b.y - a.y * b.x;
+  }
+  return 0.5 * area;
 }
 
 }  // namespace
 
-void Coverage::rasterize(const std::array<glm::dvec2, 4>& p) {
-  left_ = floor_of(std::min(std::min(p[0].x, p[1].x), std::min(p[2].x, p[3].x)));
-  top_ = floor_of(std::min(std::min(p[0].y, p[1].y), std::min(p[2].y, p[3].y)));
-  width_ = floor_of(std::max(std::max(p[0].x, p[1].x), std::max(p[2].x, p[3].x))) + 1 - left_;
-  height_ = floor_of(std::max(std::max(p[0].y, p[1].y), std::max(p[2].y, p[3].y))) + 1 - top_;
+void Coverage::rasterize(std::span<const glm::dvec2> corners) {
+  glm::dvec2 low = corners[0];
+  glm::dvec2 high = low;
+  for (const glm::dvec2 p : corners) low = glm::min(low, p), high = glm::max(high, p);
+  left_ = floor_of(low.x);
+  top_ = floor_of(low.y);
+  width_ = floor_of(high.x) + 1 - left_;
+  height_ = floor_of(high.y) + 1 - top_;
   cells_.assign(static_cast<std::size_t>(width_ + 1) * static_cast<std::size_t>(height_), 0.0);
   // Edges leave the area to their right: in pixel coordinates, y down, that is positive for downward edges.
-  sign_ = signed_area(p) > 0.0 ? -1.0 : 1.0;
+  sign_ = signed_area(corners) > 0.0 ? -1.0 : 1.0;
   const glm::dvec2 origin(left_, top_);
-  for (std::size_t i = 0; i < 4; ++i) add_edge(p[i] - origin, p[(i + 1) % 4] - origin);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    add_edge(corners[i] - origin, corners[i + 1 < corners.size() ? i + 1 : 0] - origin);
+  }
 }
 
 void Coverage::add_edge(glm::dvec2 from, glm::dvec2 to) {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -14,14 +14,14 @@ inline int floor_of(double v) {
   return static_cast<double>(i) > v ? i - 1 : i;
 }
 
-/// Which part of every pixel a quadrilateral covers, exactly. Every edge leaves in each pixel row it crosses the signed
+/// Which part of every pixel a polygon covers, exactly. Every edge leaves in each pixel row it crosses the signed
 /// area to its right, as two entries per crossed pixel, whose running sum along the row is the coverage (the
-/// accumulation buffer of anti-aliased font rasterisers). Neighbouring quadrilaterals share their edges, so that what
+/// accumulation buffer of anti-aliased font rasterisers). Neighbouring polygons share their edges, so that what
 /// one covers less, the other covers more: nothing is lost or counted twice.
 class Coverage {
  public:
-  /// Rasterises a quadrilateral given in pixel units, x to the right, y down. It must not intersect itself.
-  void rasterize(const std::array<glm::dvec2, 4>& corners);
+  /// Rasterises a polygon given in pixel units, x to the right, y down. It must not intersect itself.
+  void rasterize(std::span<const glm::dvec2> corners);
 
   /// Calls visit(column, row, area) for every pixel of which more than a rounding error is covered; columns and rows
   /// may be negative or beyond the image.
@@ -35,11 +35,6 @@ class Coverage {
         if (sign_ * area > kSmallest) visit(left_ + column, top_ + row, sign_ * area);
       }
     }
-  }
-
-  /// Most pixels that for_each_pixel() visits.
-  std::size_t most_pixels() const {
-    return static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   }
 
  private:

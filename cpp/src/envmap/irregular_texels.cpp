@@ -152,7 +152,7 @@ std::optional<std::span<const Tap>> IrregularTexels::find_straight(int face, con
     const double part = content == Content::interpolated ? share : 1.0 - share;
     if (part == 0.0) continue;
     start(content);
-    gather_quad(face, quad);
+    gather_polygon(face, quad);
     if (too_many_) return std::nullopt;
     if (total_ == 0.0) gather_point({{}, face, quad[0]}, 1.0);
     take_part(part);
@@ -247,6 +247,10 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
   const DiscExtent place =
       clipped_ ? disc_extent(job_.target.projection.kind, low, high) : DiscExtent::inside;
   if (place == DiscExtent::outside) return;
+  if (job_.is_periodic()) {
+    if (!gather_outline(face, low, high, corners, place)) split(face, low, high, corners, depth);
+    return;
+  }
   // Faces of the source that the corners lie on; a face that only the inside of the texel touches is a
   // sliver.
   std::array<int, 4> faces{};
@@ -275,7 +279,7 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
     if (regular) quads[f] = *quad;
   }
   if (regular) {
-    for (std::size_t f = 0; f < count; ++f) gather_quad(faces[f], quads[f]);
+    for (std::size_t f = 0; f < count; ++f) gather_polygon(faces[f], quads[f]);
     return;
   }
   const glm::dvec2 middle = 0.5 * (low + high);
@@ -287,6 +291,11 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
     gather_point(center, density * std::abs((high.x - low.x) * (high.y - low.y)));
     return;
   }
+  split(face, low, high, corners, depth);
+}
+
+void IrregularTexels::split(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, int depth) {
+  const glm::dvec2 middle = 0.5 * (low + high);
   // The corners of the four parts, row by row; the outer ones are known.
   const TexelCorner center = corner(face, middle.x, middle.y);
   const TexelCorner top = corner(face, middle.x, low.y);
@@ -299,36 +308,172 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
   gather(face, middle, high, {center, right, corners[2], bottom}, depth + 1);
 }
 
+// The image of a texel in a panorama, as a polygon. Nothing if the texel is so large that its outline may not tell
+// the inside from the outside, or reaches over too many texels of the source.
+bool IrregularTexels::gather_outline(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners,
+                                     DiscExtent place) {
+  constexpr double kNear = 0.8;  // cosine of the angle between the centre of a texel and its corners
+  constexpr double kMostCells = 1 << 18;
+  const glm::dvec3 center = corner(face, 0.5 * (low.x + high.x), 0.5 * (low.y + high.y)).direction;
+  for (const TexelCorner& c : corners) {
+    if (!(glm::dot(c.direction, center) > kNear)) return false;
+  }
+  outline_.clear();
+  if (place == DiscExtent::inside) {
+    trace_around(face, low, high);
+  } else {
+    trace_within_disc(face, low, high);
+  }
+  unroll_outline();
+  if (polygon_.empty()) return true;
+  glm::dvec2 first = polygon_[0];
+  glm::dvec2 last = first;
+  for (const glm::dvec2 p : polygon_) first = glm::min(first, p), last = glm::max(last, p);
+  const glm::dvec2 size = last - first + 2.0;
+  if (size.x * size.y > kMostCells) return false;
+  gather_polygon(0, polygon_);
+  return true;
+}
+
+IrregularTexels::OutlinePoint IrregularTexels::outline_point(int face, glm::dvec2 at) const {
+  return {at, corner(face, at.x, at.y).position};
+}
+
+bool IrregularTexels::is_pole(glm::dvec2 position) const {
+  constexpr double kRounding = 1e-6;
+  return position.y < kRounding || position.y > job_.height() - kRounding;
+}
+
+// A column of a panorama at most half a turn away from another.
+double IrregularTexels::unrolled(double x, double near) const {
+  return x - job_.width() * std::round((x - near) / job_.width());
+}
+
+// From a point that is known to another, but for the first one, by chords that hardly differ from the curve.
+void IrregularTexels::trace(int face, const OutlinePoint& from, const OutlinePoint& to, bool along_rim,
+                            int depth) {
+  constexpr int kDeepestEdge = 20;
+  constexpr double kDeviation = 0.02;           // in texels
+  constexpr double kDeviationPerLength = 0.01;  // of long chords
+  glm::dvec2 at = 0.5 * (from.at + to.at);
+  if (along_rim) at = glm::normalize(at);
+  const OutlinePoint middle = outline_point(face, at);
+  glm::dvec2 a = from.position;
+  glm::dvec2 m = middle.position;
+  glm::dvec2 b = to.position;
+  // The column of a pole is that from which it is seen.
+  if (is_pole(a)) a.x = is_pole(m) ? b.x : m.x;
+  m.x = is_pole(m) ? a.x : unrolled(m.x, a.x);
+  b.x = is_pole(b) ? m.x : unrolled(b.x, m.x);
+  const glm::dvec2 bend = glm::abs(m - 0.5 * (a + b));
+  const glm::dvec2 chord = glm::abs(b - a);
+  const double limit = std::max(kDeviation, kDeviationPerLength * std::max(chord.x, chord.y));
+  if (depth > 0 && (bend.x + bend.y <= limit || depth >= kDeepestEdge)) {
+    outline_.push_back(middle.position);
+    outline_.push_back(to.position);
+    return;
+  }
+  trace(face, from, middle, along_rim, depth + 1);
+  trace(face, middle, to, along_rim, depth + 1);
+}
+
+void IrregularTexels::trace_around(int face, glm::dvec2 low, glm::dvec2 high) {
+  const std::array<OutlinePoint, 4> points = {outline_point(face, low), outline_point(face, {high.x, low.y}),
+                                              outline_point(face, high),
+                                              outline_point(face, {low.x, high.y})};
+  for (std::size_t i = 0; i < 4; ++i) trace(face, points[i], points[(i + 1) % 4], false, 0);
+}
+
+// The part of the rectangle in the unit disc: where its sides leave the disc, it goes on along the rim.
+void IrregularTexels::trace_within_disc(int face, glm::dvec2 low, glm::dvec2 high) {
+  const std::array<glm::dvec2, 4> corners = {low, glm::dvec2(high.x, low.y), high, glm::dvec2(low.x, high.y)};
+  std::optional<OutlinePoint> first;
+  std::optional<OutlinePoint> before;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 a = corners[i];
+    const glm::dvec2 side = corners[(i + 1) % 4] - a;
+    // |a + t side|² = 1
+    const double q = glm::dot(side, side);
+    const double p = glm::dot(a, side) / q;
+    const double discriminant = p * p - (glm::dot(a, a) - 1.0) / q;
+    if (!(discriminant > 0.0)) continue;
+    const double enter = std::max(0.0, -p - std::sqrt(discriminant));
+    const double leave = std::min(1.0, -p + std::sqrt(discriminant));
+    if (!(enter < leave)) continue;
+    const OutlinePoint from = outline_point(face, a + enter * side);
+    const OutlinePoint to = outline_point(face, a + leave * side);
+    if (before && enter > 0.0) trace(face, *before, from, true, 0);
+    trace(face, from, to, false, 0);
+    if (!first) first = from;
+    before = to;
+  }
+  if (first && glm::dot(first->at, first->at) > 1.0 - 1e-12) trace(face, *before, *first, true, 0);
+}
+
+// So that neighbours are at most half a turn apart. Along a pole the polygon goes from one column to the next; an
+// outline that goes all around a pole is closed along it.
+void IrregularTexels::unroll_outline() {
+  polygon_.clear();
+  const auto start =
+      std::find_if(outline_.begin(), outline_.end(), [&](glm::dvec2 p) { return !is_pole(p); });
+  if (start == outline_.end()) return;
+  std::rotate(outline_.begin(), start, outline_.end());
+  outline_.push_back(outline_.front());
+  double x = outline_.front().x;
+  std::optional<double> pole;
+  double sum = 0.0;
+  for (const glm::dvec2 p : outline_) {
+    sum += p.y;
+    if (is_pole(p)) {
+      pole = p.y;
+      polygon_.push_back({x, p.y});
+      continue;
+    }
+    x = unrolled(p.x, x);
+    if (pole) polygon_.push_back({x, *pole});
+    pole.reset();
+    polygon_.push_back({x, p.y});
+  }
+  const double begin = polygon_.front().x;
+  if (std::abs(x - begin) < 0.5 * job_.width()) return;
+  const bool upper = sum < 0.5 * job_.height() * static_cast<double>(outline_.size());
+  const double closed = upper ? 0.0 : job_.height();
+  polygon_.push_back({x, closed});
+  polygon_.push_back({begin, closed});
+}
+
 void IrregularTexels::gather_point(const TexelCorner& at, double weight) {
   if (content_ == Content::constant_texels) return add(texel(at), weight);
   emit_bilinear(job_.source, at.face, at.position.x, at.position.y,
                 [&](const TexelPlace& place, double share) { add(place, weight * share); });
 }
 
-void IrregularTexels::gather_quad(int face, const Quad& quad) {
+void IrregularTexels::gather_polygon(int face, std::span<const glm::dvec2> corners) {
   const int width = job_.width();
   const int height = job_.height();
   if (content_ == Content::interpolated) {
-    constexpr double kAny = std::numeric_limits<double>::max();
-    interpolated_.integrate(quad, {job_.is_periodic() ? -kAny : 0.0, 0.0},
-                            {job_.is_periodic() ? kAny : width, height});
-    const glm::dvec2 middle = 0.25 * (quad[0] + quad[1] + quad[2] + quad[3]);
-    const double density = job_.is_periodic()
-                               ? 1.0
-                               : job_.weight(std::clamp(static_cast<int>(middle.y), 0, height - 1),
-                                             std::clamp(static_cast<int>(middle.x), 0, width - 1));
+    double density = 1.0;
+    if (job_.is_periodic()) {
+      interpolated_.integrate(corners);
+    } else {
+      interpolated_.integrate(corners, {0.0, 0.0}, {width, height});
+      glm::dvec2 middle(0.0);
+      for (const glm::dvec2 p : corners) middle += p / static_cast<double>(corners.size());
+      density = job_.weight(std::clamp(static_cast<int>(middle.y), 0, height - 1),
+                            std::clamp(static_cast<int>(middle.x), 0, width - 1));
+    }
     interpolated_.for_each_texel([&](int column, int row, double weight) {
       emit_texel(job_.source, face, row, column, density * weight,
                  [&](const TexelPlace& place, double share) { add(place, share); });
     });
     return;
   }
-  coverage_.rasterize(quad);
+  coverage_.rasterize(corners);
   coverage_.for_each_pixel([&](int column, int row, double area) {
     if (row < 0 || row >= height) return;
     if (job_.is_periodic()) {
+      column %= width;
       if (column < 0) column += width;
-      if (column >= width) column -= width;
     }
     if (column < 0 || column >= width) return;
     add({face, row, column}, area * job_.weight(row, column));

@@ -28,7 +28,8 @@ double texel_side(double area, double squares);
 double interpolated_share(double side);
 
 /// Texels whose image in the source is not a quadrilateral on one face: around poles and other singularities,
-/// across the edges of faces, on the rim of a round map, or large. It subdivides them until they are.
+/// across the edges of faces, on the rim of a round map, or large. In a panorama the outline of the image is traced
+/// as closely as needed; elsewhere the texel is subdivided until its parts are quadrilaterals.
 class IrregularTexels {
  public:
   explicit IrregularTexels(const ResampleJob& job);
@@ -69,7 +70,22 @@ class IrregularTexels {
   static void merge(std::vector<Tap>& taps);
   void gather(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, int depth);
   void gather_point(const TexelCorner& at, double weight);
-  void gather_quad(int face, const Quad& quad);
+  void gather_polygon(int face, std::span<const glm::dvec2> corners);
+  void split(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, int depth);
+
+  // A point of a texel's outline, in the plane of the target's face and in texels of the source.
+  struct OutlinePoint {
+    glm::dvec2 at;
+    glm::dvec2 position;
+  };
+  OutlinePoint outline_point(int face, glm::dvec2 at) const;
+  bool gather_outline(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, DiscExtent place);
+  void trace(int face, const OutlinePoint& from, const OutlinePoint& to, bool along_rim, int depth);
+  void trace_around(int face, glm::dvec2 low, glm::dvec2 high);
+  void trace_within_disc(int face, glm::dvec2 low, glm::dvec2 high);
+  void unroll_outline();
+  bool is_pole(glm::dvec2 position) const;
+  double unrolled(double x, double near) const;
 
   const ResampleJob& job_;
   const StraightLimits limits_;
@@ -81,7 +97,9 @@ class IrregularTexels {
   bool clipped_ = false;
   bool too_many_ = false;
   const std::function<void(std::span<const Tap>)>* consume_ = nullptr;
-  std::vector<Tap> part_;  // unnormalised
+  std::vector<glm::dvec2> outline_;  // in texels of the source
+  std::vector<glm::dvec2> polygon_;  // the same, going on across the seam
+  std::vector<Tap> part_;            // unnormalised
   std::vector<Tap> taps_;
   double total_ = 0.0;
 };

@@ -217,8 +217,8 @@ class TapApplication {
   void apply_taps(std::span<const std::uint32_t> counts, const float* weights, const std::uint32_t* targets) {
     std::uint32_t last = 0;
     for (const std::uint32_t tap : taps_) last = std::max(last, tap);
-    kernels_.apply_taps(values_.data(), channels_, taps_.data(), weights, counts.data(), counts.size(), targets,
-                        last < last_texel_, result_.data());
+    kernels_.apply_taps(values_.data(), channels_, taps_.data(), weights, counts.data(), counts.size(),
+                        targets, last < last_texel_, result_.data());
   }
 
   static std::uint32_t number(const TexelNumbering& n, int row, int column) {

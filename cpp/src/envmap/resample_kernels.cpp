@@ -173,8 +173,8 @@ inline std::int32_t floor_of(double v) {
 
 // Of pixels, or of the corners of cells with texels' centres for corners. Edges that rounding has put a bit beyond a
 // side do not count.
-void find_boxes(const PositionArrays& above, const PositionArrays& below, const std::uint8_t* __restrict kinds,
-                std::size_t count, const BoxArrays& boxes) {
+void find_boxes(const PositionArrays& above, const PositionArrays& below,
+                const std::uint8_t* __restrict kinds, std::size_t count, const BoxArrays& boxes) {
   constexpr double kRounding = 1e-9;
   const double* __restrict ax = above.x;
   const double* __restrict ay = above.y;
@@ -374,11 +374,13 @@ void apply_blocks(const float* values, int channels, const BlockGroup& group, co
                   const std::uint32_t* texels, const float* weights, const std::uint32_t* targets,
                   bool may_read_past, float* result) {
   const std::size_t stride = static_cast<std::size_t>(channels);
-  if (channels == 1) return apply_blocks_of<1, 1>(values, stride, group, steps, texels, weights, targets, result);
+  if (channels == 1)
+    return apply_blocks_of<1, 1>(values, stride, group, steps, texels, weights, targets, result);
   if (channels == 3 && may_read_past) {
     return apply_blocks_of<3, 3>(values, stride, group, steps, texels, weights, targets, result);
   }
-  if (channels == 4) return apply_blocks_of<4, 4>(values, stride, group, steps, texels, weights, targets, result);
+  if (channels == 4)
+    return apply_blocks_of<4, 4>(values, stride, group, steps, texels, weights, targets, result);
   int first = 0;
   for (; first + 4 <= channels; first += 4) {
     apply_blocks_of<4, 0>(values + first, stride, group, steps, texels, weights, targets, result + first);
@@ -406,9 +408,8 @@ void apply_taps(const float* values, int channels, const std::uint32_t* taps, co
 
 }  // namespace
 
-extern const ResampleKernels kResampleKernels = {
-    latlong_positions, cube_positions, dual_paraboloid_positions,
-    classify,          find_boxes,     find_weights,
-    number_texels,     apply_blocks,   apply_taps};
+extern const ResampleKernels kResampleKernels = {latlong_positions, cube_positions, dual_paraboloid_positions,
+                                                 classify,          find_boxes,     find_weights,
+                                                 number_texels,     apply_blocks,   apply_taps};
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

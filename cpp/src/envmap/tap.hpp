@@ -18,8 +18,12 @@ struct Tap {
 
 /// texel_at() for a map of one level and one channel, as a place.
 inline TexelPlace place_at(const EnvMapLayout& layout, int face, int row, int column) {
-  if (layout.projection.kind == ProjectionKind::latlong && row >= 0 && row < layout.height) {
-    column %= layout.width;
+  if (layout.projection.kind == ProjectionKind::latlong) {
+    // Beyond a pole lies what is half a turn away.
+    const bool beyond = row < 0 || row >= layout.height;
+    if (row < 0) row = -1 - row;
+    if (row >= layout.height) row = 2 * layout.height - 1 - row;
+    column = (column + (beyond ? layout.width / 2 : 0)) % layout.width;
     return {face, row, column < 0 ? column + layout.width : column};
   }
   const std::size_t index = texel_at(layout, 0, face, row, column);

@@ -64,9 +64,8 @@ std::size_t TapChunk::bytes() const {
 
 void TapChunk::clear() {
   const auto empty = [](auto&... vectors) { (vectors.clear(), ...); };
-  empty(blocks.groups, blocks.target_rows, blocks.target_columns, blocks.rows, blocks.columns,
-        blocks.weights, lists.target_rows, lists.target_columns, lists.counts, lists.texels, lists.weights,
-        giants);
+  empty(blocks.groups, blocks.target_rows, blocks.target_columns, blocks.rows, blocks.columns, blocks.weights,
+        lists.target_rows, lists.target_columns, lists.counts, lists.texels, lists.weights, giants);
 }
 
 bool may_have_first_texels(const Tile& tile, std::span<const SharedSymmetry> symmetries) {
@@ -271,7 +270,8 @@ void TapBuilder::sort_blocks() {
 
 void TapBuilder::add_blocks(TapChunk::Blocks& blocks) {
   std::size_t taps = 0;
-  for (const Shape& shape : shapes_) taps += static_cast<std::size_t>(shape.rows * shape.columns) * shape.count;
+  for (const Shape& shape : shapes_)
+    taps += static_cast<std::size_t>(shape.rows * shape.columns) * shape.count;
   blocks.weights.resize(taps);
   blocks.left = blocks.right = 0;
   const std::uint32_t pitch = static_cast<std::uint32_t>(tile_.columns + 1);
@@ -334,9 +334,10 @@ void TapBuilder::add_list(int row, int column, TapChunk& chunk) {
   if (looks_at_centers(job_.filter)) {
     if (face >= 0) emit_bilinear(job_.source, face, positions_.x[i], positions_.y[i], add);
   } else {
-    const auto taps = kinds_[i] == kIrregular
-                          ? irregular_.find(tile_.face, target_corner(row, column), target_corner(row + 1, column + 1))
-                          : irregular_.find_straight(face, quad(i), static_cast<double>(shares_[i]));
+    const auto taps =
+        kinds_[i] == kIrregular
+            ? irregular_.find(tile_.face, target_corner(row, column), target_corner(row + 1, column + 1))
+            : irregular_.find_straight(face, quad(i), static_cast<double>(shares_[i]));
     if (!taps) {
       chunk.giants.push_back({tile_.face, tile_.row + row, tile_.column + column});
       return;

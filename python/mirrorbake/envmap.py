@@ -244,7 +244,7 @@ class Resampler:
     projection, size, filter, source_from_target
         As for `EnvMap.resample`.
     max_bytes
-        Keep at most so much; what does not fit is found again every time. Typical are 12 bytes for each texel
+        Keep at most so much; what does not fit is found again every time. Typical are 5 bytes for each texel
         of the source that a texel of the target reads, divided by the symmetries that both maps share: 16
         between a panorama and a cube, 1 if they are turned against each other.
 

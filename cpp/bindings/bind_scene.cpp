@@ -227,10 +227,13 @@ void bind_material(nb::module_& m) {
           [](Material* self, std::string name, glm::vec3 albedo, const TextureReference& albedo_texture,
              bool specular, const Fresnel& fresnel, const TextureReference& specular_texture,
              SpecularLobe lobe, float roughness, const TextureReference& roughness_texture, float exponent,
-             LayerModel layers, glm::vec3 emission, const TextureReference& emission_texture) {
-            new (self) Material{std::move(name),  albedo,   albedo_texture,  specular,          fresnel,
-                                specular_texture, lobe,     roughness,       roughness_texture, exponent,
-                                layers,           emission, emission_texture};
+             LayerModel layers, glm::vec3 emission, const TextureReference& emission_texture, float opacity,
+             const TextureReference& opacity_texture, std::optional<float> opacity_cutoff) {
+            new (self)
+                Material{std::move(name),  albedo,   albedo_texture,   specular,          fresnel,
+                         specular_texture, lobe,     roughness,        roughness_texture, exponent,
+                         layers,           emission, emission_texture, opacity,           opacity_texture,
+                         opacity_cutoff};
           },
           nb::kw_only(), nb::arg("name") = "", nb::arg("albedo") = glm::vec3(0.5F),
           nb::arg("albedo_texture") = TextureReference{}, nb::arg("specular") = false,
@@ -238,7 +241,8 @@ void bind_material(nb::module_& m) {
           nb::arg("lobe") = SpecularLobe::mirror, nb::arg("roughness") = Material{}.roughness,
           nb::arg("roughness_texture") = TextureReference{}, nb::arg("exponent") = Material{}.exponent,
           nb::arg("layers") = LayerModel::additive, nb::arg("emission") = glm::vec3(0.0F),
-          nb::arg("emission_texture") = TextureReference{})
+          nb::arg("emission_texture") = TextureReference{}, nb::arg("opacity") = 1.0F,
+          nb::arg("opacity_texture") = TextureReference{}, nb::arg("opacity_cutoff") = nb::none())
       .def_rw("name", &Material::name)
       .def_rw("albedo", &Material::albedo, "Lambertian reflectance per channel, in [0, 1]")
       .def_rw("albedo_texture", &Material::albedo_texture, "multiplies `albedo`")
@@ -252,7 +256,13 @@ void bind_material(nb::module_& m) {
       .def_rw("exponent", &Material::exponent, "of the lobe `phong`: N, in [1, 1e6]")
       .def_rw("layers", &Material::layers)
       .def_rw("emission", &Material::emission, "radiance emitted on the front side, W sr⁻¹ m⁻²")
-      .def_rw("emission_texture", &Material::emission_texture, "multiplies `emission`");
+      .def_rw("emission_texture", &Material::emission_texture, "multiplies `emission`")
+      .def_rw("opacity", &Material::opacity,
+              "part of the surface that is there, in [0, 1]: rays pass between")
+      .def_rw("opacity_texture", &Material::opacity_texture,
+              "its first channel multiplies `opacity`; its texels have to be in memory")
+      .def_rw("opacity_cutoff", &Material::opacity_cutoff,
+              "None, or: all is there where the opacity is at least this, nothing elsewhere");
 }
 
 void bind_visibility(nb::module_& m) {

@@ -524,7 +524,7 @@ class SpecularLobe(enum.Enum):
 class Material:
     """What a surface does with light."""
 
-    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: TextureReference = ..., specular: bool = False, fresnel: Fresnel = ..., specular_texture: TextureReference = ..., lobe: SpecularLobe = SpecularLobe.mirror, roughness: float = 0.10000000149011612, roughness_texture: TextureReference = ..., exponent: float = 100.0, layers: LayerModel = LayerModel.additive, emission: Sequence[float] = (0.0, 0.0, 0.0), emission_texture: TextureReference = ...) -> None: ...
+    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: TextureReference = ..., specular: bool = False, fresnel: Fresnel = ..., specular_texture: TextureReference = ..., lobe: SpecularLobe = SpecularLobe.mirror, roughness: float = 0.10000000149011612, roughness_texture: TextureReference = ..., exponent: float = 100.0, layers: LayerModel = LayerModel.additive, emission: Sequence[float] = (0.0, 0.0, 0.0), emission_texture: TextureReference = ..., opacity: float = 1.0, opacity_texture: TextureReference = ..., opacity_cutoff: float | None = None) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -612,6 +612,31 @@ class Material:
 
     @emission_texture.setter
     def emission_texture(self, arg: TextureReference, /) -> None: ...
+
+    @property
+    def opacity(self) -> float:
+        """part of the surface that is there, in [0, 1]: rays pass between"""
+
+    @opacity.setter
+    def opacity(self, arg: float, /) -> None: ...
+
+    @property
+    def opacity_texture(self) -> TextureReference:
+        """
+        its first channel multiplies `opacity`; its texels have to be in memory
+        """
+
+    @opacity_texture.setter
+    def opacity_texture(self, arg: TextureReference, /) -> None: ...
+
+    @property
+    def opacity_cutoff(self) -> float | None:
+        """
+        None, or: all is there where the opacity is at least this, nothing elsewhere
+        """
+
+    @opacity_cutoff.setter
+    def opacity_cutoff(self, arg: float | None, /) -> None: ...
 
 class Visibility(enum.Flag):
     """A set of the kinds of rays that see an object."""

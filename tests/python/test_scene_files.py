@@ -383,7 +383,9 @@ def test_a_texture_that_stays_in_its_file_looks_like_one_in_memory(tmp_path: Pat
 
 
 def test_cameras_and_warnings_come_with_the_scene(tmp_path: Path) -> None:
-    scene = GlbScene(materials=[{**LAMBERT, "alphaMode": "MASK"}])
+    scene = GlbScene(
+        materials=[{**LAMBERT, "alphaMode": "MASK", "alphaCutoff": 0.25, "occlusionTexture": {"index": 0}}]
+    )
     scene.add_mesh(SQUARE, SQUARE_TRIANGLES, 0)
     scene.nodes = [{"mesh": 0}, {"camera": 0, "name": "eye", "translation": [0, 1, 3]}]
     scene.extra = {"cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}]}
@@ -393,18 +395,22 @@ def test_cameras_and_warnings_come_with_the_scene(tmp_path: Path) -> None:
     assert camera.vertical_fov_degrees == pytest.approx(math.degrees(0.8))
     assert repr(camera) == "SceneCamera('eye')"
     (warning,) = loaded.warnings
-    assert (warning.message, warning.count) == ("alpha mode MASK is not supported: opaque", 1)
-    assert repr(warning) == "SceneWarning('alpha mode MASK is not supported: opaque', count=1)"
+    message = "occlusion textures are not used: the ray tracer finds what is occluded"
+    assert (warning.message, warning.count) == (message, 1)
+    assert repr(warning) == f"SceneWarning('{message}', count=1)"
+    material = loaded.scene.material(0)
+    assert (material.opacity, material.opacity_cutoff, material.opacity_texture.texture) == (1.0, 0.25, -1)
 
 
 def test_an_obj_scene_has_its_materials(tmp_path: Path) -> None:
-    (tmp_path / "a.mtl").write_text("newmtl gold\nKd 0.1 0.1 0\nKs 0.9 0.7 0.2\nNs 50\n")
+    (tmp_path / "a.mtl").write_text("newmtl gold\nKd 0.1 0.1 0\nKs 0.9 0.7 0.2\nNs 50\nd 0.75\n")
     path = tmp_path / "a.obj"
     path.write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\no sail\nusemtl gold\nf 1 2 3\n")
     loaded = mirrorbake.load_scene(str(path))
     assert loaded.scene.object_names == ["sail"]
     material = loaded.scene.material(0)
     assert (material.lobe, material.exponent) == (mirrorbake.SpecularLobe.phong, 50.0)
+    assert (material.opacity, material.opacity_cutoff) == (0.75, None)
 
 
 def test_text_of_another_encoding_does_not_get_in_the_way(tmp_path: Path) -> None:

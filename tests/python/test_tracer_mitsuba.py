@@ -46,9 +46,12 @@ class Twin:
     peer: dict[str, Any] = field(default_factory=lambda: {"type": "scene"})
 
     def add(self, mesh: core.TriangleMesh, material: core.Material, bsdf: dict[str, Any]) -> None:
+        self.add_one_sided(mesh, material, {"type": "twosided", "nested": bsdf})
+
+    def add_one_sided(self, mesh: core.TriangleMesh, material: core.Material, bsdf: dict[str, Any]) -> None:
         number = self.scene.add_object("object", mesh, self.scene.add_material(material))
         shape = self._ply(f"mesh{number}", mesh)
-        shape["bsdf"] = {"type": "twosided", "nested": bsdf}
+        shape["bsdf"] = bsdf
         if any(material.emission):
             shape["emitter"] = {"type": "area", "radiance": rgb(material.emission)}
         self.peer[f"mesh{number}"] = shape
@@ -391,6 +394,28 @@ def bright_lamps(directory: Path) -> Twin:
     return twin
 
 
+def lace_screen(directory: Path) -> Twin:
+    """Two matte screens with gaps before a box, one of them with a texture of gaps, whose shadows show."""
+    twin = Twin(directory, **IN_ROOM)
+    add_room(twin)
+    twin.matte(core.make_box((-1.2, 0, -1.2), (-0.2, 1.5, -0.3)), (0.7, 0.7, 0.7))
+    texels = np.random.default_rng(4).random((8, 8, 1), np.float32).repeat(3, axis=2)
+    texture = twin.scene.add_texture(texels)
+    bitmap = {
+        "type": "bitmap", "bitmap": mi.Bitmap(texels), "raw": True,
+        "filter_type": "bilinear", "wrap_mode": "repeat",
+    }  # fmt: skip
+    albedo = (0.3, 0.5, 0.8)
+    body = {"type": "twosided", "nested": {"type": "diffuse", "reflectance": rgb(albedo)}}
+    lace = core.Material(albedo=albedo, opacity_texture=core.TextureReference(texture))
+    screen = core.make_rectangle((-1.0, 0.4, 0.4), (1.2, 0, 0.2), (0, 1.2, 0.1))
+    twin.add_one_sided(screen, lace, {"type": "mask", "opacity": bitmap, "nested": body})
+    gauze = core.Material(albedo=albedo, opacity=0.4)
+    ceiling = core.make_rectangle((0.2, 2.2, 0.5), (1.0, 0, 0), (0, 0, -1.0))
+    twin.add_one_sided(ceiling, gauze, {"type": "mask", "opacity": 0.4, "nested": body})
+    return twin
+
+
 def blocks(image: Any) -> Any:
     count = SIZE // BLOCK
     return image.reshape(count, BLOCK, count, BLOCK, 3).mean(axis=(1, 3)).ravel()
@@ -411,6 +436,7 @@ def blocks(image: Any) -> Any:
         glowing_ball,
         point_light,
         bright_lamps,
+        lace_screen,
     ],
     ids=lambda f: f.__name__,
 )

@@ -205,6 +205,17 @@ Image without_alpha(Image image, int alpha) {
   return image;
 }
 
+Image only_alpha(Image image, int alpha) {
+  const std::size_t channels = image.channels.size();
+  std::size_t to = 0;
+  for (auto from = static_cast<std::size_t>(alpha); from < image.pixels.size(); from += channels) {
+    image.pixels[to++] = image.pixels[from];
+  }
+  image.pixels.resize(to);
+  image.channels = {"A"};
+  return image;
+}
+
 std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path, FileKind kind,
                                              const ImageLimits& limits, OIIO::Filesystem::IOProxy* proxy,
                                              OIIO::ImageSpec& spec) {
@@ -260,6 +271,9 @@ Image read(const std::string& path, FileKind kind, const DecodeOptions& options,
   }
   if (options.alpha == AlphaUse::drop && spec.alpha_channel >= 0 && spec.nchannels > 1) {
     return without_alpha(std::move(image), spec.alpha_channel);
+  }
+  if (options.alpha == AlphaUse::only && spec.alpha_channel >= 0) {
+    return only_alpha(std::move(image), spec.alpha_channel);
   }
   return image;
 }

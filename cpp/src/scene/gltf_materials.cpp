@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
+#include <span>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -115,6 +117,7 @@ struct MaterialReader::Parameters {
   float metallic = 1.0F;
   float roughness = 1.0F;
   float dielectric_r0 = 0.04F;
+  float alpha = 1.0F;
   std::optional<Use> base_use;
   std::optional<Use> metallic_roughness_use;
 };
@@ -185,16 +188,21 @@ std::string MaterialReader::image_file(const tinygltf::Image& image) const {
   return file->string();
 }
 
-Image MaterialReader::decode(int index, Transfer transfer) {
+template <typename Read>
+auto MaterialReader::read_image(int index, const Read& read) const {
   const tinygltf::Image& image = element(path_, model_.images, index, "image");
   const std::string name = path_ + ": image " + std::to_string(index);
-  if (image.bufferView >= 0) {
-    return reader_.read(name, view_bytes(path_, model_, image.bufferView, "image"), transfer);
-  }
-  if (image.uri.empty()) return reader_.read(name, image.image, transfer);
+  if (image.bufferView >= 0) return read(name, view_bytes(path_, model_, image.bufferView, "image"));
+  if (image.uri.empty()) return read(name, std::span(image.image));
   const std::string file = image_file(image);
   const std::string bytes = read_file(file);
-  return reader_.read(file, {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()}, transfer);
+  return read(file, std::span(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+}
+
+Image MaterialReader::decode(int index, Transfer transfer) {
+  return read_image(index, [&](const std::string& name, std::span<const unsigned char> bytes) {
+    return reader_.read(name, bytes, transfer);
+  });
 }
 
 template <typename Make>
@@ -204,11 +212,13 @@ TextureReference MaterialReader::made_texture(const Use& use, const std::string&
                           std::to_string(static_cast<int>(use.wrap_v));
   auto it = texture_of_.find(key);
   if (it == texture_of_.end()) {
-    Texture texture = make();
-    texture.wrap_u = use.wrap_u;
-    texture.wrap_v = use.wrap_v;
-    it = texture_of_.emplace(key, static_cast<int>(scene_.textures.size())).first;
-    scene_.textures.push_back(std::move(texture));
+    std::optional<Texture> texture = make();
+    it = texture_of_.emplace(key, texture ? static_cast<int>(scene_.textures.size()) : -1).first;
+    if (texture) {
+      texture->wrap_u = use.wrap_u;
+      texture->wrap_v = use.wrap_v;
+      scene_.textures.push_back(std::move(*texture));
+    }
   }
   reference.texture = it->second;
   return reference;
@@ -234,6 +244,7 @@ MaterialReader::Parameters MaterialReader::parameters(const tinygltf::Material& 
   p.base = reflectance(path_, where + "baseColorFactor",
                        glm::vec3(pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]),
                        warnings_);
+  p.alpha = static_cast<float>(unit_factor(path_, where + "baseColorFactor's alpha", pbr.baseColorFactor[3]));
   p.metallic = static_cast<float>(unit_factor(path_, where + "metallicFactor", pbr.metallicFactor));
   p.roughness = static_cast<float>(unit_factor(path_, where + "roughnessFactor", pbr.roughnessFactor));
   if (const tinygltf::Value* ior = extension(material.extensions, "KHR_materials_ior")) {
@@ -336,10 +347,37 @@ void MaterialReader::set_roughness(const Parameters& p, Material& result) {
       });
 }
 
-void MaterialReader::warn_of_what_is_lost(const tinygltf::Material& material) {
-  if (material.alphaMode != "OPAQUE" && !material.alphaMode.empty()) {
-    warnings_.add("alpha mode " + material.alphaMode.substr(0, 40) + " is not supported: opaque");
+// glTF 2.0 §3.9.4.
+void MaterialReader::set_opacity(const tinygltf::Material& material, const Parameters& p,
+                                 const std::string& where, Material& result) {
+  if (material.alphaMode.empty() || material.alphaMode == "OPAQUE") return;
+  if (material.alphaMode == "MASK") {
+    if (!(material.alphaCutoff >= 0.0)) {
+      fail(path_, where + "alphaCutoff is " + std::to_string(material.alphaCutoff) + ", expected at least 0");
+    }
+    result.opacity_cutoff =
+        static_cast<float>(std::min(material.alphaCutoff, double{std::numeric_limits<float>::max()}));
+  } else if (material.alphaMode != "BLEND") {
+    fail(path_,
+         where + "alphaMode is '" + material.alphaMode.substr(0, 40) + "', expected OPAQUE, MASK or BLEND");
   }
+  result.opacity = p.alpha;
+  if (!p.base_use) return;
+  const int index = p.base_use->image;
+  result.opacity_texture =
+      made_texture(*p.base_use, "opacity " + std::to_string(index), [&]() -> std::optional<Texture> {
+        std::optional<Image> image =
+            read_image(index, [&](const std::string& name, std::span<const unsigned char> bytes) {
+              return reader_.read_opacity(name, bytes, false);
+            });
+        if (!image) return std::nullopt;
+        Texture texture;
+        texture.image = std::move(*image);
+        return texture;
+      });
+}
+
+void MaterialReader::warn_of_what_is_lost(const tinygltf::Material& material) {
   if (material.normalTexture.index >= 0) warnings_.add("normal textures are not supported");
   if (material.occlusionTexture.index >= 0) {
     warnings_.add("occlusion textures are not used: the ray tracer finds what is occluded");
@@ -350,6 +388,7 @@ Material MaterialReader::convert(const tinygltf::Material& material, const std::
   Material result;
   const Parameters p = parameters(material, where);
   warn_of_what_is_lost(material);
+  set_opacity(material, p, where, result);
   if (extension(material.extensions, "KHR_materials_unlit") != nullptr) {
     // The colour is what the eye sees, whatever the light.
     result.albedo = glm::vec3(0.0F);

@@ -51,12 +51,17 @@ class MaterialReader {
   Material convert(const tinygltf::Material& material, const std::string& where);
   void set_colours(const Parameters& p, Material& result);
   void set_roughness(const Parameters& p, Material& result);
+  void set_opacity(const tinygltf::Material& material, const Parameters& p, const std::string& where,
+                   Material& result);
   void warn_of_what_is_lost(const tinygltf::Material& material);
 
   std::string image_file(const tinygltf::Image& image) const;
+  /// read(name, bytes) of an image's file, wherever it is stored.
+  template <typename Read>
+  auto read_image(int image, const Read& read) const;
   Image decode(int image, Transfer transfer);
   TextureReference plain_texture(const Use& use);  ///< of a colour image as it is
-  /// The texture of this name, made only once.
+  /// The texture of this name, made only once; `make` may give none.
   template <typename Make>
   TextureReference made_texture(const Use& use, const std::string& name, const Make& make);
 

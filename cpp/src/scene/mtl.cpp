@@ -46,6 +46,12 @@ class Line {
     return *value;
   }
 
+  float fraction() const {
+    const std::optional<float> value = number(rest_);
+    if (!value || !(*value >= 0.0F && *value <= 1.0F)) fail("one number from 0 to 1");
+    return *value;
+  }
+
   // Three numbers, or one for all three.
   glm::vec3 colour() const {
     glm::vec3 value(0.0F);
@@ -135,10 +141,12 @@ void read_line(const Line& line, std::string_view keyword, Definition& material,
     material.specular_map = line.map(warnings);
   } else if (keyword == "map_Ke") {
     material.emission_map = line.map(warnings);
+  } else if (keyword == "map_d") {
+    material.dissolve_map = line.map(warnings);
   } else if (keyword == "d") {
-    if (line.one_number() < 1.0F) warnings.add("MTL transparency (d, Tr) is not supported: opaque");
+    material.dissolve = line.fraction();
   } else if (keyword == "Tr") {
-    if (line.one_number() > 0.0F) warnings.add("MTL transparency (d, Tr) is not supported: opaque");
+    material.transparency = line.fraction();
   } else if (keyword != "Ka" && keyword != "map_Ka" && keyword != "Tf" && keyword != "sharpness") {
     warnings.add("MTL keyword " + std::string(keyword.substr(0, 40)) + " is not supported");
   }
@@ -183,12 +191,15 @@ Material material_from(const std::string& path, const Definition& definition, Wa
   material.albedo_texture = definition.diffuse_map.transform;
   material.emission = radiance(path, where + "Ke", definition.emission);
   material.emission_texture = definition.emission_map.transform;
+  material.opacity = definition.dissolve.value_or(1.0F - definition.transparency.value_or(0.0F));
+  material.opacity_texture = definition.dissolve_map.transform;
 
   const int illumination = definition.illumination.value_or(2);
   const bool is_mirror = illumination >= 3 && illumination <= 9;
   const bool has_fresnel = illumination == 5 || illumination == 6 || illumination == 7 || illumination == 9;
   if (illumination == 4 || illumination == 6 || illumination == 7 || illumination == 9) {
-    warnings.add("MTL illumination models with refraction (4, 6, 7, 9) are not supported: opaque");
+    warnings.add(
+        "MTL illumination models with refraction (4, 6, 7, 9) are not supported: nothing is refracted");
   }
   const glm::vec3 specular = reflectance(path, where + "Ks", definition.specular, warnings);
   if (has_fresnel && specular == glm::vec3(0.0F) && definition.index) {

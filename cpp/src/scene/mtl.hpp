@@ -23,13 +23,15 @@ struct Map {
 
 struct Definition {
   std::string name;
-  std::optional<glm::vec3> diffuse;  ///< Kd
-  glm::vec3 specular{0.0F};          ///< Ks
-  glm::vec3 emission{0.0F};          ///< Ke
-  std::optional<float> exponent;     ///< Ns
-  std::optional<float> index;        ///< Ni
-  std::optional<int> illumination;   ///< illum
-  Map diffuse_map, specular_map, emission_map;
+  std::optional<glm::vec3> diffuse;   ///< Kd
+  glm::vec3 specular{0.0F};           ///< Ks
+  glm::vec3 emission{0.0F};           ///< Ke
+  std::optional<float> exponent;      ///< Ns
+  std::optional<float> index;         ///< Ni
+  std::optional<int> illumination;    ///< illum
+  std::optional<float> dissolve;      ///< d
+  std::optional<float> transparency;  ///< Tr, 1 − d; d counts where a file has both
+  Map diffuse_map, specular_map, emission_map, dissolve_map;
 };
 
 /// The first word of a line, and the rest without the spaces around it.

@@ -1,5 +1,6 @@
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <tuple>
@@ -98,6 +99,7 @@ class ObjScene {
     float largest = 1.0F;
     add_map(library, definition.emission_map, material.emission_texture, &largest);
     material.emission *= largest;
+    add_opacity(library, definition.dissolve_map, material.opacity_texture);
     return material;
   }
 
@@ -122,6 +124,22 @@ class ObjScene {
     texture_of_.emplace(key, std::pair(reference.texture, factor));
   }
 
+  void add_opacity(const fs::path& library, const mtl::Map& map, TextureReference& reference) {
+    if (map.file.empty()) return;
+    const fs::path file = resolved(library, map.file);
+    const auto [it, is_new] = opacity_of_.try_emplace(std::pair(file, map.wrap), -1);
+    if (is_new) {
+      const std::string bytes = read_file(file.string());
+      std::optional<Image> image = textures_.read_opacity(
+          file.string(), {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()}, true);
+      if (image) {
+        it->second = static_cast<int>(loaded_.scene.textures.size());
+        loaded_.scene.textures.push_back({std::move(*image), map.wrap, map.wrap});
+      }
+    }
+    reference.texture = it->second;
+  }
+
   const std::string& path_;
   const SceneOptions& options_;
   Warnings warnings_;
@@ -130,6 +148,7 @@ class ObjScene {
   std::set<fs::path> libraries_;
   std::map<std::string, Defined> definitions_;
   std::map<std::tuple<fs::path, TextureWrap, bool>, std::pair<int, float>> texture_of_;
+  std::map<std::pair<fs::path, TextureWrap>, int> opacity_of_;  ///< −1: opaque everywhere
 };
 
 }  // namespace

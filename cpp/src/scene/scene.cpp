@@ -90,6 +90,21 @@ void check_reference(const Scene& scene, const std::string& where, const Texture
   }
 }
 
+void check_opacity(const Scene& scene, const std::string& where, const Material& material) {
+  if (!(material.opacity >= 0.0F && material.opacity <= 1.0F)) {
+    throw InvalidArgument(where + " opacity", text(material.opacity), "a value in [0, 1]");
+  }
+  if (material.opacity_cutoff && !(*material.opacity_cutoff >= 0.0F && is_finite(*material.opacity_cutoff))) {
+    throw InvalidArgument(where + " opacity_cutoff", text(*material.opacity_cutoff),
+                          "a finite value of at least 0");
+  }
+  check_reference(scene, where + " opacity_texture", material.opacity_texture);
+  const int texture = material.opacity_texture.texture;
+  if (texture >= 0 && scene.textures[static_cast<std::size_t>(texture)].file != nullptr) {
+    throw InvalidArgument(where + " opacity_texture", "a file", "a texture in memory");
+  }
+}
+
 void check_material(const Scene& scene, std::size_t index) {
   const Material& material = scene.materials[index];
   const std::string where = label("material", index, material.name);
@@ -101,6 +116,7 @@ void check_material(const Scene& scene, std::size_t index) {
     throw InvalidArgument(where + " emission", text(material.emission), "finite values of at least 0");
   }
   check_reference(scene, where + " emission_texture", material.emission_texture);
+  check_opacity(scene, where, material);
   if (!material.specular) return;
   check_reference(scene, where + " specular_texture", material.specular_texture);
   check_reference(scene, where + " roughness_texture", material.roughness_texture);

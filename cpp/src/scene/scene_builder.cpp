@@ -82,30 +82,53 @@ void TextureReader::reserve(const std::string& name, int width, int height, int 
 
 void TextureReader::release(const Image& image) { bytes_ -= image.pixels.size() * sizeof(float); }
 
-Image TextureReader::read(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
-                          float* largest) {
-  DecodeOptions decode;
-  decode.limits = {options_.max_texture_side, 4, options_.max_texture_bytes - bytes_};
-  decode.transfer = transfer;
-  decode.alpha = AlphaUse::drop;
-  Image image = decode_image(name, bytes, decode);
+Image TextureReader::decode(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
+                            AlphaUse alpha) {
+  DecodeOptions options;
+  options.limits = {options_.max_texture_side, 4, options_.max_texture_bytes - bytes_};
+  options.transfer = transfer;
+  options.alpha = alpha;
+  Image image = decode_image(name, bytes, options);
   if (image.channels.size() != 1 && image.channels.size() != 3) {
     throw FileError(name,
                     "has " + std::to_string(image.channels.size()) + " channels, expected grey or R, G, B");
   }
-  reserve(name, image.width, image.height, image.channel_count());
-  float most = 1.0F;
   for (const float v : image.pixels) {
     if (!(v >= 0.0F) || !std::isfinite(v)) {
       throw FileError(name, "has the value " + std::to_string(v) + ", expected finite ones of at least 0");
     }
-    most = std::max(most, v);
   }
+  reserve(name, image.width, image.height, image.channel_count());
+  return image;
+}
+
+Image TextureReader::read(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
+                          float* largest) {
+  Image image = decode(name, bytes, transfer, AlphaUse::drop);
+  const float most = std::max(1.0F, *std::max_element(image.pixels.begin(), image.pixels.end()));
   if (most > 1.0F) {
     if (largest == nullptr) warnings_.add(name + ": values above 1 are taken as 1");
     for (float& v : image.pixels) v = largest != nullptr ? v / most : std::min(v, 1.0F);
   }
   if (largest != nullptr) *largest = most;
+  return image;
+}
+
+std::optional<Image> TextureReader::read_opacity(const std::string& name,
+                                                 std::span<const unsigned char> bytes, bool grey_counts) {
+  Image image = decode(name, bytes, Transfer::linear, AlphaUse::only);
+  release(image);
+  if (image.channels[0] != "A" && !grey_counts) return std::nullopt;
+  const std::size_t channels = image.channels.size();
+  for (std::size_t i = 0; i * channels < image.pixels.size(); ++i) {
+    image.pixels[i] = std::min(image.pixels[i * channels], 1.0F);
+  }
+  image.pixels.resize(image.pixels.size() / channels);
+  image.channels = {"A"};
+  if (std::all_of(image.pixels.begin(), image.pixels.end(), [](float v) { return v == 1.0F; })) {
+    return std::nullopt;
+  }
+  reserve(name, image.width, image.height, 1);
   return image;
 }
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -37,6 +38,11 @@ class TextureReader {
   Image read(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
              float* largest = nullptr);
 
+  /// The alpha channel of an image, or else, if `grey_counts`, its first channel; none if the surface is opaque
+  /// everywhere. Errors as for read().
+  std::optional<Image> read_opacity(const std::string& name, std::span<const unsigned char> bytes,
+                                    bool grey_counts);
+
   /// The texture of an image file that is used as it is: in memory, or through the cache if it is large. Large ones beyond 1
   /// are an error.
   Texture read_file_texture(const std::string& path, Transfer transfer, float* largest = nullptr);
@@ -47,6 +53,9 @@ class TextureReader {
   void release(const Image& image);
 
  private:
+  Image decode(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
+               AlphaUse alpha);
+
   const SceneOptions& options_;
   Warnings& warnings_;
   std::uint64_t bytes_ = 0;

@@ -65,6 +65,17 @@ glm::vec3 texture_mean(const Texture& texture) {
   return glm::vec3(sum / static_cast<double>(texels));
 }
 
+bool has_gaps(const Material& material) {
+  return material.opacity_texture.texture >= 0 || material.opacity < material.opacity_cutoff.value_or(1.0F);
+}
+
+float opacity_at(const Scene& scene, const Material& material, glm::vec2 uv) {
+  float opacity = material.opacity;
+  if (material.opacity_texture.texture >= 0) opacity *= texture_lookup(scene, material.opacity_texture, uv).x;
+  if (!material.opacity_cutoff) return opacity;
+  return opacity >= *material.opacity_cutoff ? 1.0F : 0.0F;
+}
+
 glm::vec3 texture_lookup(const Scene& scene, const TextureReference& reference, glm::vec2 uv) {
   return texture_lookup(scene.textures[static_cast<std::size_t>(reference.texture)],
                         texture_coordinates(reference, uv));

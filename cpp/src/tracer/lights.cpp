@@ -381,13 +381,14 @@ std::optional<LightSample> Lights::sample_mesh(int object, glm::vec3 position, g
   if (!(cosine > 0.0F)) return std::nullopt;
   const Material& material = scene_->materials[static_cast<std::size_t>(scene_->objects[index].material)];
   glm::vec3 emission = material.emission;
+  glm::vec2 uv(0.0F);
+  if (!source.uvs.empty()) {
+    uv = (1.0F - b1 - b2) * source.uvs[corner.x] + b1 * source.uvs[corner.y] + b2 * source.uvs[corner.z];
+  }
   if (material.emission_texture.texture >= 0) {
-    glm::vec2 uv(0.0F);
-    if (!source.uvs.empty()) {
-      uv = (1.0F - b1 - b2) * source.uvs[corner.x] + b1 * source.uvs[corner.y] + b2 * source.uvs[corner.z];
-    }
     emission *= texture_lookup(*scene_, material.emission_texture, uv);
   }
+  if (has_gaps(material)) emission *= opacity_at(*scene_, material, uv);
   const float pdf = distance * distance / (mesh.area * cosine);
   return LightSample{direction, distance, emission / pdf, mesh.is_reflected ? pdf : 0.0F};
 }

@@ -42,7 +42,8 @@ constexpr Visibility visibility_bit(RayKind kind) {
 }
 
 EmbreeGeometry make_geometry(RTCDevice device, std::span<const glm::vec3> positions,
-                             std::span<const glm::uvec3> triangles, glm::vec3 origin, unsigned mask) {
+                             std::span<const glm::uvec3> triangles, glm::vec3 origin, unsigned mask,
+                             const OpacityLookup* opacity = nullptr) {
   EmbreeGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
   auto* vertices = static_cast<glm::vec3*>(rtcSetNewGeometryBuffer(
       geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(glm::vec3), positions.size()));
@@ -52,6 +53,7 @@ EmbreeGeometry make_geometry(RTCDevice device, std::span<const glm::vec3> positi
   std::transform(positions.begin(), positions.end(), vertices, [&](glm::vec3 p) { return p - origin; });
   std::copy(triangles.begin(), triangles.end(), indices);
   rtcSetGeometryMask(geometry.get(), mask);
+  if (opacity != nullptr) set_opacity_filter(device, geometry.get(), *opacity);
   rtcCommitGeometry(geometry.get());
   return geometry;
 }
@@ -126,10 +128,12 @@ RayScene::RayScene(const Scene& scene)
     b.max -= origin_;
   }
 
+  for (std::uint32_t i = 0; i < scene.objects.size(); ++i) opacity_lookups_.push_back({&scene, i});
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const TriangleMesh& mesh = scene.objects[i].mesh;
-    geometries_.push_back(
-        make_geometry(device_.get(), mesh.positions, mesh.triangles, origin_, mask_bits_[i]));
+    const bool gaps = has_gaps(scene.materials[static_cast<std::size_t>(scene.objects[i].material)]);
+    geometries_.push_back(make_geometry(device_.get(), mesh.positions, mesh.triangles, origin_, mask_bits_[i],
+                                        gaps ? &opacity_lookups_[i] : nullptr));
     const auto* buffer = static_cast<const glm::vec3*>(
         rtcGetGeometryBufferData(geometries_.back().get(), RTC_BUFFER_TYPE_VERTEX, 0));
     positions_.emplace_back(buffer, mesh.positions.size());

@@ -10,6 +10,7 @@
 
 #include "embree_device.hpp"
 #include "mirrorbake/scene/scene.hpp"
+#include "opacity_filter.hpp"
 
 namespace mirrorbake::tracing {
 
@@ -80,7 +81,8 @@ class RayPacket {
   alignas(64) RTCRayHit16 query_;
 };
 
-/// The scene in Embree: one geometry per object, then one per rectangle light and per sphere light.
+/// The scene, which must not go away, in Embree: one geometry per object, then one per rectangle light and per sphere
+/// light.
 /// Coordinates are relative to `origin`, so that a scene far from the world's origin is traced with the
 /// precision of one close to it.
 class RayScene {
@@ -130,6 +132,7 @@ class RayScene {
   EmbreeScene build(const std::vector<bool>& leave_out) const;
 
   EmbreeDevice device_;
+  std::vector<OpacityLookup> opacity_lookups_;  ///< per object; geometries point to them
   std::vector<EmbreeGeometry> geometries_;
   EmbreeScene scene_;
   std::vector<Visibility> visibility_;  ///< per object

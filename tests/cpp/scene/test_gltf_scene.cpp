@@ -205,12 +205,49 @@ TEST_F(GltfSceneFile, AlphaDoesNotDarkenTheColour) {
       R"([{"alphaMode":"BLEND","pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0}}])";
   document.extra = extra;
   const LoadedScene loaded = load(document);
-  EXPECT_THAT(messages(loaded), ElementsAre("alpha mode BLEND is not supported: opaque x1"));
-  const Image& image = loaded.scene.textures.at(0).image;
+  EXPECT_THAT(messages(loaded), ElementsAre());
+  const int albedo = loaded.scene.materials.at(0).albedo_texture.texture;
+  const Image& image = loaded.scene.textures.at(static_cast<std::size_t>(albedo)).image;
   ASSERT_EQ(image.pixels.size(), 3U);
   // One unit of the 8 bits is up to 0.9 % of these; the test's own premultiplied PNG may be off by one.
   EXPECT_NEAR(image.pixels[0], linear_from_srgb(200), 0.01);
   EXPECT_NEAR(image.pixels[2], linear_from_srgb(50), 0.005);
+}
+
+// glTF 2.0 §3.9.4.
+TEST_F(GltfSceneFile, AlphaModesDecideWhatBecomesOfAlpha) {
+  png("a.png", 2, 1, {200, 100, 50, 51, 10, 20, 30, 204});
+  png("opaque.png", 1, 1, {200, 100, 50});
+  const auto material = [&](const std::string& mode, const std::string& file) {
+    Document document;
+    document.materials = "[{" + mode + R"("pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.5],
+        "baseColorTexture":{"index":0},"metallicFactor":0}}])";
+    document.extra = R"("textures":[{"source":0}],"images":[{"uri":")" + file + R"("}],)";
+    return load(document).scene;
+  };
+  const auto opacities = [](const Scene& scene) {
+    const Material& m = scene.materials.at(0);
+    return std::pair(opacity_at(scene, m, {0.25F, 0.5F}), opacity_at(scene, m, {0.75F, 0.5F}));
+  };
+  // Alpha is linear: 51/255 and 204/255, times the factor.
+  const std::pair blend = opacities(material(R"("alphaMode":"BLEND",)", "a.png"));
+  EXPECT_FLOAT_EQ(blend.first, 0.1F);
+  EXPECT_FLOAT_EQ(blend.second, 0.4F);
+  EXPECT_EQ(opacities(material("", "a.png")), std::pair(1.0F, 1.0F));
+  EXPECT_EQ(opacities(material(R"("alphaMode":"OPAQUE",)", "a.png")), std::pair(1.0F, 1.0F));
+  EXPECT_EQ(opacities(material(R"("alphaMode":"MASK",)", "a.png")), std::pair(0.0F, 0.0F));
+  EXPECT_EQ(opacities(material(R"("alphaMode":"MASK","alphaCutoff":0.25,)", "a.png")), std::pair(0.0F, 1.0F));
+  EXPECT_EQ(opacities(material(R"("alphaMode":"MASK","alphaCutoff":1.5,)", "a.png")), std::pair(0.0F, 0.0F));
+  const Scene opaque = material(R"("alphaMode":"BLEND",)", "opaque.png");
+  EXPECT_EQ(opaque.materials.at(0).opacity_texture.texture, -1);
+  EXPECT_EQ(opaque.materials.at(0).opacity, 0.5F);
+  Document wrong;
+  wrong.materials = R"([{"alphaMode":"GLASS"}])";
+  expect_error(wrong, "material 0 alphaMode is 'GLASS', expected OPAQUE, MASK or BLEND");
+  wrong.materials = R"([{"alphaMode":"MASK","alphaCutoff":-1}])";
+  expect_error(wrong, "material 0 alphaCutoff is -1");
+  wrong.materials = R"([{"pbrMetallicRoughness":{"baseColorFactor":[1,1,1,2]}}])";
+  expect_error(wrong, "baseColorFactor's alpha");
 }
 
 TEST_F(GltfSceneFile, MetallicTexturesAreMixedIntoAlbedoAndReflectance) {

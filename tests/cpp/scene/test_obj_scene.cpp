@@ -122,15 +122,45 @@ TEST_F(ObjSceneFile, MapsAreReadWithTheirTransform) {
   EXPECT_THAT(loaded.warnings, IsEmpty());
 }
 
+TEST_F(ObjSceneFile, DissolveIsTheOpacity) {
+  EXPECT_EQ(red("Kd 1 1 1").opacity, 1.0F);
+  EXPECT_EQ(red("d 0.25").opacity, 0.25F);
+  EXPECT_EQ(red("Tr 0.25").opacity, 0.75F);
+  // Exporters disagree on Tr; what they say with d counts, in any order.
+  EXPECT_EQ(red("d 1\nTr 1").opacity, 1.0F);
+  EXPECT_EQ(red("Tr 0\nd 0.5").opacity, 0.5F);
+  EXPECT_FALSE(red("d 0.5").opacity_cutoff);
+  expect_error("newmtl red\nd 1.5\n", "line 2: d '1.5', expected one number from 0 to 1");
+  expect_error("newmtl red\nTr nan\n", "line 2: Tr 'nan', expected one number from 0 to 1");
+}
+
+TEST_F(ObjSceneFile, DissolveMapsAreAlphaOrElseGrey) {
+  Image grey(2, 1, {"Y"});
+  grey.pixels = {0.25F, 1.0F};
+  save_image((directory_ / "grey.exr").string(), grey);
+  Image leaf(2, 1, {"R", "G", "B", "A"});
+  leaf.pixels = {0.5F, 0.5F, 0.5F, 0.75F, 0.0F, 0.0F, 0.0F, 0.0F};
+  save_image((directory_ / "leaf.exr").string(), leaf);
+  Image opaque(1, 1, {"Y"});
+  opaque.pixels = {1.0F};
+  save_image((directory_ / "opaque.exr").string(), opaque);
+  const auto opacities = [](const Scene& scene) {
+    const Material& m = scene.materials.at(0);
+    return std::pair(opacity_at(scene, m, {0.25F, 0.5F}), opacity_at(scene, m, {0.75F, 0.5F}));
+  };
+  EXPECT_EQ(opacities(load("newmtl red\nmap_d grey.exr\n").scene), std::pair(0.25F, 1.0F));
+  EXPECT_EQ(opacities(load("newmtl red\nd 0.5\nmap_d grey.exr\n").scene), std::pair(0.125F, 0.5F));
+  EXPECT_EQ(opacities(load("newmtl red\nmap_d leaf.exr\n").scene), std::pair(0.75F, 0.0F));
+  EXPECT_FALSE(has_gaps(load("newmtl red\nmap_d opaque.exr\n").scene.materials.at(0)));
+}
+
 TEST_F(ObjSceneFile, WhatIsLostIsCounted) {
-  const LoadedScene loaded =
-      load("newmtl red\nd 0.5\nmap_Bump bump.png\nKd 2 1 1\nnewmtl shiny\nTr 0.5\nillum 7\nKs 1\n");
+  const LoadedScene loaded = load("newmtl red\nmap_Bump bump.png\nKd 2 1 1\nnewmtl shiny\nillum 7\nKs 1\n");
   EXPECT_THAT(
       messages(loaded),
-      ElementsAre("MTL transparency (d, Tr) is not supported: opaque x2",
-                  "MTL keyword map_Bump is not supported x1",
-                  "material 'red' Kd: values above 1 are taken as 1 x1",
-                  "MTL illumination models with refraction (4, 6, 7, 9) are not supported: opaque x1"));
+      ElementsAre(
+          "MTL keyword map_Bump is not supported x1", "material 'red' Kd: values above 1 are taken as 1 x1",
+          "MTL illumination models with refraction (4, 6, 7, 9) are not supported: nothing is refracted x1"));
   const LoadedScene bare = load_scene(write("bare.obj", std::string("mtllib gone.mtl\n") + kTriangles));
   EXPECT_THAT(messages(bare),
               ElementsAre("the material library 'gone.mtl' does not exist x1",

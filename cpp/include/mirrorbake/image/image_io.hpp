@@ -50,9 +50,9 @@ ImageSize read_image_size(const std::string& path, const ImageLimits& limits = {
 /// Whether integers are decoded from sRGB: as load_image does, always (floats too), or never.
 enum class Transfer { automatic, srgb, linear };
 
-/// What becomes of an alpha channel: the colour is multiplied by it, as load_image does, or it is dropped and the
-/// colour left as it is stored.
-enum class AlphaUse { multiply, drop };
+/// What becomes of an alpha channel: the colour is multiplied by it, as load_image does; it is dropped and the colour
+/// left as it is stored; or it alone is kept. Images without one stay as they are.
+enum class AlphaUse { multiply, drop, only };
 
 struct DecodeOptions {
   ImageLimits limits;

@@ -77,6 +77,10 @@ struct Material {
   LayerModel layers = LayerModel::additive;
   glm::vec3 emission{0.0F};           ///< radiance emitted on the front side, W sr⁻¹ m⁻²
   TextureReference emission_texture;  ///< multiplies `emission`
+  float opacity = 1.0F;               ///< part of the surface that is there, in [0,1]: rays pass between
+  TextureReference opacity_texture;   ///< its first channel multiplies `opacity`; its texels are in memory
+  std::optional<float>
+      opacity_cutoff;  ///< all is there where the opacity is at least this, nothing elsewhere
 };
 
 /// A set of the kinds of rays that see an object.
@@ -167,6 +171,12 @@ struct Scene {
 
 /// Value of a texture, which must be in the scene, for a mesh's coordinates `uv`, v up.
 glm::vec3 texture_lookup(const Scene& scene, const TextureReference& reference, glm::vec2 uv);
+
+/// Whether rays pass through some of the surface.
+bool has_gaps(const Material& material);
+
+/// The part of a surface that is there for a mesh's coordinates `uv`, v up: 0 or 1 if the material has a cutoff.
+float opacity_at(const Scene& scene, const Material& material, glm::vec2 uv);
 
 /// Throws InvalidArgument if anything in the scene is unusable: indices out of range, arrays of unequal
 /// length, vertices that are not finite or beyond ±1e12, normals that are not unit vectors, a mesh without

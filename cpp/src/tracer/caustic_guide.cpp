@@ -17,16 +17,15 @@ namespace mirrorbake::tracing {
 namespace {
 
 constexpr std::size_t kPhotons = 1U << 17;
-constexpr std::uint32_t kSpecularBounces = 4;
 
 // Cells along the grid's longest side.
 constexpr int kCells = 32;
-// Following the guide, a path finds caustics; otherwise all else. Half as many as the others at most.
-constexpr float kLargestShare = 0.35F;
-// Where caustics are this part of the light that falls on the reflectors, half the largest share follows.
+// Guided rays per path, at most.
+constexpr float kMostRays = 0.7F;
+// Where caustics are this part of the light that falls on the reflectors, there are half as many.
 constexpr float kNoticeable = 0.01F;
-// Less than this is not worth the look.
-constexpr float kLeastShare = 0.05F;
+// Fewer than this are not worth the look.
+constexpr float kFewestRays = 0.1F;
 
 // The octahedral map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT
 // 3(2), 2014) to [−1,1]², and its solid angle per area, |d|₁³ for a unit direction d.
@@ -137,8 +136,8 @@ void CausticGuide::shoot_one(const World& world, const Hit& start, float area, c
   }
   glm::vec3 power = area * glm::dot(surface.geometric_normal, light->direction) * light->radiance;
   photons.received += static_cast<double>(luminance(power));
-  for (std::uint32_t bounce = 0; bounce < kSpecularBounces; ++bounce) {
-    const SpecularBounce next = specular_bounce(surface, stream.get(2 + bounce));
+  for (int bounce = 0; bounce < kSpecularBounces; ++bounce) {
+    const SpecularBounce next = specular_bounce(surface, stream.get(2 + static_cast<std::uint32_t>(bounce)));
     power *= surface.fresnel * next.weight;
     if (!(luminance(power) > 0.0F)) return;
     const Ray ray{offset_origin(surface, next.direction), next.direction};
@@ -230,10 +229,10 @@ void CausticGuide::fill(const std::vector<Photon>& photons, double irradiance_of
     double power = 0.0;
     for (float value : histogram) power += static_cast<double>(value);
     const double irradiance = power / cell_area;
-    const auto share = static_cast<float>(kLargestShare * irradiance / (irradiance + noticeable));
-    if (share < kLeastShare) continue;
+    const auto rays = static_cast<float>(kMostRays * irradiance / (irradiance + noticeable));
+    if (rays < kFewestRays) continue;
 
-    grid_[c] = {share, static_cast<std::uint32_t>(first_.size() - 1), 0};
+    grid_[c] = {rays, static_cast<std::uint32_t>(first_.size() - 1), 0};
     std::vector<double> powers;
     for (std::size_t word = 0; word < kWords; ++word) {
       LitBins lit;

@@ -15,8 +15,8 @@ struct World;
 class SpecularTriangles;
 
 /// Where to look for caustics: from which directions light arrives at a place by way of specular surfaces. A
-/// diffuse path finds such light by chance alone, seldom and brightly; the guide tells it where to look
-/// (Jensen, "Importance Driven Path Tracing using the Photon Map", EGWR 1995). It only chooses directions:
+/// diffuse path finds such light by chance alone, seldom and brightly; the guide tells where rays of their own should
+/// look (after Jensen, "Importance Driven Path Tracing using the Photon Map", EGWR 1995). It only chooses directions:
 /// what is found along them is weighted by their density, so that the guide need not be right.
 ///
 /// A photon starts at a random point of the specular surfaces, lit by a random light, and follows their
@@ -30,12 +30,14 @@ class CausticGuide {
   /// Bins of directions: the octahedral map, cut into squares.
   static constexpr int kSide = 40;
   static constexpr int kBins = kSide * kSide;
+  /// Specular surfaces between a light and a diffuse one, at most.
+  static constexpr int kSpecularBounces = 4;
 
   /// What is known of one place.
   struct Cell {
-    /// Of the samples that should follow the guide, in [0,1); 0: there is nothing to find.
-    float share = 0.0F;
-    std::uint32_t number = 0;       ///< among the cells with a share
+    /// Guided rays that are worth their while beside a path of weight 1, in [0,1); 0: there is nothing to find.
+    float rays = 0.0F;
+    std::uint32_t number = 0;       ///< among the cells with rays
     std::uint64_t lit_squares = 0;  ///< which of 8 × 8 squares of bins light arrives from
   };
   Cell cell(glm::vec3 position) const {
@@ -85,9 +87,9 @@ class CausticGuide {
   float cells_per_metre_ = 0.0F;
   glm::ivec3 size_{0};
   std::vector<Cell> grid_;
-  std::vector<LitBins> lit_;  ///< kWords per cell with a share
+  std::vector<LitBins> lit_;  ///< kWords per cell with rays
   /// Of the cells' lit bins, one cell after the other.
-  std::vector<std::uint32_t> first_;  ///< per cell with a share, + 1
+  std::vector<std::uint32_t> first_;  ///< per cell with rays, + 1
   std::vector<std::uint16_t> bins_;
   std::vector<float>
       cdf_;  ///< before each bin; a cell's begins with 0 and ends with 1, an entry more than bins

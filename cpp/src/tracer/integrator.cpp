@@ -13,7 +13,6 @@ namespace mirrorbake::tracing {
 namespace {
 
 constexpr float kInversePi = std::numbers::inv_pi_v<float>;
-constexpr float kBelowOne = 0x1.fffffep-1F;
 
 // Shadow rays stop this fraction short of the light they aim at.
 constexpr float kShadowEpsilon = 1e-4F;
@@ -55,34 +54,10 @@ struct Partners {
   bool lobe = false;
 };
 
-// How a diffuse path goes on. Most samples follow the cosine; where caustics fall, some follow the guide.
-struct DiffuseBounce {
-  glm::vec3 direction{0.0F};  ///< unit
-  float weight = 0.0F;        ///< of what arrives from there, before the albedo; 0: below the surface
-  /// Density by the cosine alone: what next-event estimation shares with. The two need only agree on it.
-  float pdf = 0.0F;
-};
-
-DiffuseBounce diffuse_bounce(const World& world, const Surface& surface, glm::vec2 u) {
-  const CausticGuide::Cell cell = world.guide.cell(surface.position);
-  DiffuseBounce bounce;
-  if (cell.share == 0.0F) {
-    bounce.direction = sample_cosine_hemisphere(Frame(surface.normal), u);
-  } else if (u.x < cell.share) {
-    bounce.direction = world.guide.sample(cell, {u.x / cell.share, u.y});
-  } else {
-    u.x = std::min((u.x - cell.share) / (1.0F - cell.share), kBelowOne);
-    bounce.direction = sample_cosine_hemisphere(Frame(surface.normal), u);
-  }
-  const float cosine = glm::dot(surface.normal, bounce.direction);
-  if (!(cosine > 0.0F) || !(glm::dot(surface.geometric_normal, bounce.direction) > 0.0F)) return bounce;
-  bounce.pdf = cosine * kInversePi;
-  bounce.weight = 1.0F;
-  if (cell.share > 0.0F) {
-    const float guided = world.guide.pdf(cell, bounce.direction);
-    bounce.weight = bounce.pdf / (bounce.pdf + cell.share * (guided - bounce.pdf));
-  }
-  return bounce;
+// Density of the cosine, by which diffuse paths go on; 0 below the surface.
+float cosine_pdf(const Surface& surface, glm::vec3 direction) {
+  const float cosine = glm::dot(surface.normal, direction);
+  return cosine > 0.0F && glm::dot(surface.geometric_normal, direction) > 0.0F ? cosine * kInversePi : 0.0F;
 }
 
 struct DirectLight {
@@ -218,78 +193,154 @@ glm::vec3 radiance(const World& world, const Ray& first_ray, const Hit& first_hi
   }
 }
 
+namespace {
+
+// The random numbers of a vertex of a diffuse path.
+struct VertexNumbers {
+  const SampleStream& stream;
+  std::uint32_t first_dimension;
+  bool stratified;
+
+  VertexNumbers(const SampleStream& stream_, int bounce, int vertex)
+      : stream(stream_),
+        first_dimension(dimension_base(bounce, std::min(vertex, static_cast<int>(vertices_per_bounce) - 1))),
+        // It pays off where many samples share the vertices before: on the first two of a path.
+        stratified(vertex <= 2) {}
+
+  glm::vec2 operator()(std::uint32_t use) const {
+    return stratified ? stream.get(first_dimension + use) : stream.get_independent(first_dimension + use);
+  }
+};
+
+// Radiance of the lights that a guided ray finds by way of specular surfaces alone, as an estimate of π⁻¹ ×
+// irradiance. Weighted (power heuristic) for a partner that follows the cosine, `guided_partner_weight`.
+// `specular_bounces` were before.
+glm::vec3 guided_light(const World& world, const Surface& start, CausticGuide::Cell cell,
+                       const PathLimits& limits, int specular_bounces, const VertexNumbers& numbers) {
+  const glm::vec2 u = numbers(guide_dimension);
+  if (!(u.x < cell.rays)) return glm::vec3(0.0F);
+  const glm::vec3 direction = world.guide.sample(cell, {u.x / cell.rays, u.y});
+  const float pdf = cosine_pdf(start, direction);
+  const float guided = cell.rays * world.guide.pdf(cell, direction);
+  if (!(pdf > 0.0F) || !(guided > 0.0F)) return glm::vec3(0.0F);
+  glm::vec3 sum(0.0F);
+  glm::vec3 throughput(pdf / guided * power_heuristic(guided, pdf));
+  Ray ray{offset_origin(start, direction), direction};
+  float lobe_pdf = 0.0F;
+  for (int chain = 0;; ++chain) {
+    const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
+    if (hit.missed() || world.is_light(hit)) {
+      return chain > 0 ? sum + throughput * emitted_light(world, ray, hit, lobe_pdf) : sum;
+    }
+    const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
+    if (chain > 0) sum += throughput * emitted_light(world, ray, hit, surface, lobe_pdf);
+    if (chain == CausticGuide::kSpecularBounces) return sum;
+    if (!specular_follows(surface, limits, specular_bounces + chain)) return sum;
+    throughput *= surface.fresnel;
+    glm::vec2 lobe(0.0F);
+    if (surface.rough()) {
+      const std::uint32_t use = guide_dimension + 1 + 2 * static_cast<std::uint32_t>(chain);
+      sum += throughput * direct_light(world, surface, numbers(use), {.lobe = true}, true).lobe;
+      lobe = numbers(use + 1);
+    }
+    const SpecularBounce next = specular_bounce(surface, lobe);
+    throughput *= next.weight;
+    if (throughput == glm::vec3(0.0F)) return sum;
+    ray = {offset_origin(surface, next.direction), next.direction};
+    lobe_pdf = next.pdf;
+  }
+}
+
+// Weight of what `guided_light` finds as well, for a ray along the cosine.
+float guided_partner_weight(const World& world, CausticGuide::Cell cell, glm::vec3 direction, float pdf) {
+  return cell.rays > 0.0F ? power_heuristic(pdf, cell.rays * world.guide.pdf(cell, direction)) : 1.0F;
+}
+
+float brightest(glm::vec3 c) { return std::max(c.x, std::max(c.y, c.z)); }
+
+}  // namespace
+
 glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const PathLimits& limits,
                                 const SampleStream& stream, int bounce) {
   glm::vec3 sum(0.0F);
   glm::vec3 throughput(1.0F);
   Surface surface = start;
-  int diffuse_bounces = 1;
+  int diffuse_bounces = 0;
   int specular_bounces = 0;
-  // What the surfaces reflect of the path so far, made up for by the roulette.
-  glm::vec3 reflected(1.0F);
-  const DiffuseBounce first =
-      diffuse_bounce(world, surface, stream.get(dimension_base(bounce, 0) + diffuse_dimension));
-  throughput *= first.weight;
-  glm::vec3 direction = first.direction;
-  float pdf = first.pdf;  // 0 after a mirror: emission counts in full
+  glm::vec3 direction(0.0F);
+  float pdf = 0.0F;  // 0 after a mirror: emission counts in full
+  // Since the last diffuse surface: what is known of caustics there, the specular surfaces passed, and the weight of
+  // the light that they show.
+  CausticGuide::Cell cell;
+  int chain = 0;
+  float chain_weight = 1.0F;
+  const auto leave_diffuse = [&](const VertexNumbers& numbers) {
+    cell = world.guide.cell(surface.position);
+    if (cell.rays > 0.0F) {
+      cell.rays *= std::min(1.0F, brightest(throughput));
+      sum += throughput * guided_light(world, surface, cell, limits, specular_bounces, numbers);
+    }
+    direction = sample_cosine_hemisphere(Frame(surface.normal), numbers(diffuse_dimension));
+    pdf = cosine_pdf(surface, direction);
+    ++diffuse_bounces;
+    chain = 0;
+    chain_weight = 1.0F;
+  };
+  leave_diffuse({stream, bounce, 0});
   for (int vertex = 1;; ++vertex) {
     if (throughput == glm::vec3(0.0F) || !(glm::dot(surface.geometric_normal, direction) > 0.0F)) return sum;
     const Ray ray{offset_origin(surface, direction), direction};
     const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
-    if (hit.missed() || world.is_light(hit)) return sum + throughput * emitted_light(world, ray, hit, pdf);
+    if (hit.missed() || world.is_light(hit))
+      return sum + chain_weight * throughput * emitted_light(world, ray, hit, pdf);
     surface = surface_at(world.scene, world.rays, hit, direction);
-    sum += throughput * emitted_light(world, ray, hit, surface, pdf);
+    sum += chain_weight * throughput * emitted_light(world, ray, hit, surface, pdf);
 
-    // One lobe at random, in proportion to what the lobes reflect.
-    const std::uint32_t dimension =
-        dimension_base(bounce, std::min(vertex, static_cast<int>(vertices_per_bounce) - 1));
-    // Stratification pays off where many samples share the vertices before: on the first two of a path.
-    const auto random = [&](std::uint32_t use) {
-      return vertex <= 2 ? stream.get(dimension + use) : stream.get_independent(dimension + use);
-    };
-    const glm::vec2 choice = random(lobe_dimension);
+    const VertexNumbers numbers(stream, bounce, vertex);
     const bool has_body = surface.albedo != glm::vec3(0.0F);
     const bool continue_diffuse = has_body && diffuse_bounces < limits.diffuse_depth;
-    const bool continue_specular = surface.specular() && specular_bounces <= limits.specular_depth;
+    const bool continue_specular = specular_follows(surface, limits, specular_bounces);
     const bool has_lobe = surface.rough() && continue_specular;
+    if (continue_specular && chain == 0) chain_weight = guided_partner_weight(world, cell, direction, pdf);
+    if (chain == CausticGuide::kSpecularBounces) chain_weight = 1.0F;
     if (has_body || has_lobe) {
-      const DirectLight direct = direct_light(world, surface, random(light_dimension),
+      const DirectLight direct = direct_light(world, surface, numbers(light_dimension),
                                               {.cosine = continue_diffuse, .lobe = true}, has_lobe);
-      sum += throughput * (surface.albedo * kInversePi * direct.irradiance + surface.fresnel * direct.lobe);
+      sum += throughput *
+             (surface.albedo * kInversePi * direct.irradiance + chain_weight * surface.fresnel * direct.lobe);
     }
+    // One lobe at random, in proportion to what the lobes reflect.
+    const glm::vec2 choice = numbers(lobe_dimension);
     const float diffuse_share = continue_diffuse ? luminance(surface.albedo) : 0.0F;
     const float specular_share = continue_specular ? luminance(surface.fresnel) : 0.0F;
     const float total = diffuse_share + specular_share;
     if (!(total > 0.0F)) return sum;
     const float specular_probability = specular_share / total;
-    if (choice.x < specular_probability) {
-      const SpecularBounce next =
-          specular_bounce(surface, surface.rough() ? random(rough_dimension) : glm::vec2(0.0F));
-      const glm::vec3 factor = surface.fresnel * next.weight / specular_probability;
-      throughput *= factor;
-      reflected *= factor;
+    const bool follow_specular = choice.x < specular_probability;
+    SpecularBounce next;
+    if (follow_specular) {
+      next = specular_bounce(surface, surface.rough() ? numbers(rough_dimension) : glm::vec2(0.0F));
+      throughput *= surface.fresnel * next.weight / specular_probability;
+    } else {
+      throughput *= surface.albedo / (1.0F - specular_probability);
+    }
+    // Russian roulette. Paths are short-lived only once little is left: an early end saves less time than its noise
+    // costs.
+    constexpr float kLittle = 0.25F;
+    const float left = brightest(throughput);
+    if (!(left > 0.0F)) return sum;
+    if (vertex >= 2 && left < kLittle) {
+      const float survival = left / kLittle;
+      if (!(choice.y < survival)) return sum;
+      throughput /= survival;
+    }
+    if (follow_specular) {
       direction = next.direction;
       pdf = next.pdf;
       ++specular_bounces;
+      ++chain;
     } else {
-      const DiffuseBounce next = diffuse_bounce(world, surface, random(diffuse_dimension));
-      const glm::vec3 factor = surface.albedo / (1.0F - specular_probability);
-      throughput *= next.weight * factor;
-      reflected *= factor;
-      direction = next.direction;
-      pdf = next.pdf;
-      ++diffuse_bounces;
-    }
-    // Russian roulette by what the surfaces reflect: the guide's weights are small just where much light is to be
-    // found. Paths are short-lived only once that is little: an early end saves less time than its noise costs.
-    constexpr float kReflectedLittle = 0.25F;
-    const float brightest = std::max(reflected.x, std::max(reflected.y, reflected.z));
-    if (!(brightest > 0.0F)) return sum;
-    if (vertex >= 2 && brightest < kReflectedLittle) {
-      const float survival = brightest / kReflectedLittle;
-      if (!(choice.y < survival)) return sum;
-      throughput /= survival;
-      reflected /= survival;
+      leave_diffuse(numbers);
     }
   }
 }

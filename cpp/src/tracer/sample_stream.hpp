@@ -37,7 +37,8 @@ enum Dimension : std::uint32_t {
   light_dimension = 1,    ///< next-event estimation
   diffuse_dimension = 2,  ///< direction of a diffuse bounce
   lobe_dimension = 3,     ///< choice of a lobe and Russian roulette
-  dimensions_per_vertex = 4,
+  guide_dimension = 4,    ///< guided ray; then light and direction at each rough surface on its way
+  dimensions_per_vertex = 16,
   vertices_per_bounce = 256,
 };
 

@@ -14,8 +14,10 @@ struct CdfSample {
 
 /// `cdf` has count + 1 entries.
 inline CdfSample sample_cdf(const float* cdf, int count, float u) {
-  const float* after = std::upper_bound(cdf + 1, cdf + count, u);
-  const int i = static_cast<int>(after - cdf) - 1;
+  // The last entry that is not above u, without a branch that could not be foreseen.
+  const float* start = cdf;
+  for (int n = count; n > 1; n -= n / 2) start += n / 2 * static_cast<int>(start[n / 2] <= u);
+  const int i = static_cast<int>(start - cdf);
   const float width = cdf[i + 1] - cdf[i];
   const float place = width > 0.0F ? (u - cdf[i]) / width : 0.5F;
   return {i, std::clamp(place, 0.0F, std::nextafter(1.0F, 0.0F))};

@@ -151,9 +151,8 @@ SpecularBounce specular_bounce(const Surface& surface, const SampleStream& strea
 
 glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf) {
   if (hit.missed()) {
-    const glm::vec3 radiance = world.lights.environment_radiance(ray.direction);
-    if (!(pdf > 0.0F) || radiance == glm::vec3(0.0F)) return radiance;
-    return power_heuristic(pdf, world.lights.environment_pdf(ray.direction)) * radiance;
+    const EnvironmentSampler::Found found = world.lights.environment(ray.direction);
+    return pdf > 0.0F ? power_heuristic(pdf, found.pdf) * found.radiance : found.radiance;
   }
   const int light = world.light_number(hit);
   const glm::vec3 radiance = world.lights.hit_radiance(light, ray);

@@ -153,18 +153,7 @@ EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
   flux_ = normalise_cdf(row_cdf_.data(), row_sums.data(), height);
 }
 
-glm::vec2 EnvironmentSampler::uv_from_direction(glm::vec3 d) const {
-  // Undo the rotation about +Y, then: the centre is −Z, +X to its right.
-  const float x = cosine_ * d.x - sine_ * d.z;
-  const float z = sine_ * d.x + cosine_ * d.z;
-  const float u = 0.5F + std::atan2(x, -z) / (2.0F * kPi);
-  // acos(y) loses half its digits at the poles.
-  const float v = std::atan2(std::hypot(x, z), d.y) / kPi;
-  return {std::clamp(u, 0.0F, 1.0F), std::clamp(v, 0.0F, 1.0F)};
-}
-
-glm::vec3 EnvironmentSampler::radiance(glm::vec3 direction) const {
-  const glm::vec2 uv = uv_from_direction(direction);
+glm::vec3 EnvironmentSampler::radiance(glm::vec2 uv) const {
   const int width = panorama_->width;
   const int height = panorama_->height;
   const float x = uv.x * static_cast<float>(width) - 0.5F;
@@ -174,43 +163,53 @@ glm::vec3 EnvironmentSampler::radiance(glm::vec3 direction) const {
   const float fx = x - static_cast<float>(x0);
   const float fy = y - static_cast<float>(y0);
   const auto texel = [&](int i, int j) {
-    const float* p = panorama_->at((i + width) % width, std::clamp(j, 0, height - 1));
+    if (i < 0) i += width;
+    if (i >= width) i -= width;
+    const float* p = panorama_->at(i, std::clamp(j, 0, height - 1));
     return glm::vec3(p[0], p[1], p[2]);
   };
   return scale_ * ((1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
                    fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1)));
 }
 
-float EnvironmentSampler::pdf(glm::vec3 direction) const {
-  const glm::vec2 uv = uv_from_direction(direction);
-  const int width = panorama_->width;
-  const int height = panorama_->height;
-  const int x = std::min(static_cast<int>(uv.x * static_cast<float>(width)), width - 1);
-  const int y = std::min(static_cast<int>(uv.y * static_cast<float>(height)), height - 1);
-  const float* row = &column_cdf_[static_cast<std::size_t>(y) * (static_cast<std::size_t>(width) + 1)];
-  const float probability =
-      (row_cdf_[static_cast<std::size_t>(y) + 1] - row_cdf_[static_cast<std::size_t>(y)]) *
-      (row[x + 1] - row[x]);
-  // Samples are uniform in solid angle within a texel.
+float EnvironmentSampler::pdf(int x, int y) const {
   const auto edge = static_cast<std::size_t>(y);
+  const int width = panorama_->width;
+  const float* row = &column_cdf_[edge * (static_cast<std::size_t>(width) + 1)];
+  const float probability = (row_cdf_[edge + 1] - row_cdf_[edge]) * (row[x + 1] - row[x]);
+  // Samples are uniform in solid angle within a texel.
   const double solid_angle = (row_cosine_[edge] - row_cosine_[edge + 1]) * 2.0 * std::numbers::pi / width;
   return static_cast<float>(probability / solid_angle);
 }
 
-glm::vec3 EnvironmentSampler::sample(glm::vec2 u) const {
+EnvironmentSampler::Found EnvironmentSampler::find(glm::vec3 direction) const {
+  // Undo the rotation about +Y, then: the centre is −Z, +X to its right.
+  const float x = cosine_ * direction.x - sine_ * direction.z;
+  const float z = sine_ * direction.x + cosine_ * direction.z;
+  // acos(y) loses half its digits at the poles.
+  const glm::vec2 uv(std::clamp(0.5F + std::atan2(x, -z) / (2.0F * kPi), 0.0F, 1.0F),
+                     std::clamp(std::atan2(std::sqrt(x * x + z * z), direction.y) / kPi, 0.0F, 1.0F));
+  const int width = panorama_->width;
+  const int height = panorama_->height;
+  return {radiance(uv), pdf(std::min(static_cast<int>(uv.x * static_cast<float>(width)), width - 1),
+                            std::min(static_cast<int>(uv.y * static_cast<float>(height)), height - 1))};
+}
+
+EnvironmentSampler::Sample EnvironmentSampler::sample(glm::vec2 u) const {
   const int width = panorama_->width;
   const int height = panorama_->height;
   const CdfSample row = sample_cdf(row_cdf_.data(), height, u.y);
-  const CdfSample column = sample_cdf(
-      &column_cdf_[static_cast<std::size_t>(row.index) * (static_cast<std::size_t>(width) + 1)], width, u.x);
   const auto edge = static_cast<std::size_t>(row.index);
+  const CdfSample column = sample_cdf(&column_cdf_[edge * (static_cast<std::size_t>(width) + 1)], width, u.x);
+  const float across = (static_cast<float>(column.index) + column.place) / static_cast<float>(width);
   const double y = row_cosine_[edge] + row.place * (row_cosine_[edge + 1] - row_cosine_[edge]);
-  const float azimuth =
-      2.0F * kPi * ((static_cast<float>(column.index) + column.place) / static_cast<float>(width) - 0.5F);
   const auto radius = static_cast<float>(std::sqrt(std::max(0.0, (1.0 - y) * (1.0 + y))));
+  const float azimuth = 2.0F * kPi * (across - 0.5F);
   const float x = radius * std::sin(azimuth);
   const float z = -radius * std::cos(azimuth);
-  return glm::normalize(glm::vec3(cosine_ * x + sine_ * z, static_cast<float>(y), -sine_ * x + cosine_ * z));
+  const glm::vec3 direction(cosine_ * x + sine_ * z, y, -sine_ * x + cosine_ * z);
+  const glm::vec2 uv(across, std::atan2(radius, direction.y) / kPi);
+  return {glm::normalize(direction), {radiance(uv), pdf(column.index, row.index)}};
 }
 
 Lights::Lights(const Scene& scene, const RayScene& rays)
@@ -346,11 +345,10 @@ std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u) const
       break;
     case Kind::mesh: sample = sample_mesh(light.index, position, u); break;
     case Kind::environment: {
-      const glm::vec3 direction = environment_->sample(u);
-      const float pdf = environment_->pdf(direction);
+      const EnvironmentSampler::Sample sky = environment_->sample(u);
+      const float pdf = sky.found.pdf;
       if (pdf > 0.0F) {
-        sample = {direction, std::numeric_limits<float>::infinity(), environment_->radiance(direction) / pdf,
-                  pdf};
+        sample = {sky.direction, std::numeric_limits<float>::infinity(), sky.found.radiance / pdf, pdf};
       }
       break;
     }
@@ -418,12 +416,11 @@ std::optional<LightSample> Lights::sample_rectangle(const Rectangle& r, glm::vec
   return LightSample{direction, distance, r.radiance / pdf, pdf};
 }
 
-glm::vec3 Lights::environment_radiance(glm::vec3 direction) const {
-  return environment_ ? environment_->radiance(direction) : glm::vec3(0.0F);
-}
-
-float Lights::environment_pdf(glm::vec3 direction) const {
-  return environment_probability_ > 0.0F ? environment_probability_ * environment_->pdf(direction) : 0.0F;
+EnvironmentSampler::Found Lights::environment(glm::vec3 direction) const {
+  if (!environment_) return {glm::vec3(0.0F), 0.0F};
+  EnvironmentSampler::Found found = environment_->find(direction);
+  found.pdf *= environment_probability_;
+  return found;
 }
 
 glm::vec3 Lights::hit_radiance(int light, const Ray& ray) const {

@@ -24,15 +24,23 @@ class EnvironmentSampler {
  public:
   explicit EnvironmentSampler(const EnvironmentLight& light);
 
-  glm::vec3 radiance(glm::vec3 direction) const;
-  /// Density per solid angle with which `sample` takes this direction.
-  float pdf(glm::vec3 direction) const;
-  glm::vec3 sample(glm::vec2 u) const;  ///< a unit direction
+  /// What is found in a direction.
+  struct Found {
+    glm::vec3 radiance;
+    float pdf;  ///< density per solid angle with which `sample` takes the direction
+  };
+  Found find(glm::vec3 direction) const;
+  struct Sample {
+    glm::vec3 direction;  ///< unit
+    Found found;
+  };
+  Sample sample(glm::vec2 u) const;
   /// ∫ luminance dω.
   double flux() const { return flux_; }
 
  private:
-  glm::vec2 uv_from_direction(glm::vec3 direction) const;
+  glm::vec3 radiance(glm::vec2 uv) const;
+  float pdf(int x, int y) const;  ///< in a texel
 
   const Image* panorama_;
   float scale_;
@@ -55,10 +63,8 @@ class Lights {
   /// A direction from `position` to a light; nothing if the light turns its back.
   std::optional<LightSample> sample(glm::vec3 position, glm::vec2 u) const;
 
-  /// Radiance that a ray in `direction` finds where it leaves the scene.
-  glm::vec3 environment_radiance(glm::vec3 direction) const;
-  /// Density with which `sample` takes a direction that leaves the scene.
-  float environment_pdf(glm::vec3 direction) const;
+  /// What a ray in `direction` finds where it leaves the scene, and the density with which `sample` takes it.
+  EnvironmentSampler::Found environment(glm::vec3 direction) const;
 
   /// What a ray finds that hits light number `light`: the rectangles come first, then the spheres.
   glm::vec3 hit_radiance(int light, const Ray& ray) const;

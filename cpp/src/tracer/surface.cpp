@@ -34,14 +34,10 @@ glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
 
 }  // namespace
 
-glm::vec3 triangle_normal(glm::vec3 a, glm::vec3 b, glm::vec3 c) {
-  const glm::vec3 n = glm::cross(b - a, c - a);
-  const float square = glm::dot(n, n);
-  if (square > 1e-30F && square < 1e30F) return n / std::sqrt(square);
-  // Edges below a tenth of a millimetre: the square underflows in float.
-  const glm::dvec3 exact = glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a));
-  const double length = glm::length(exact);
-  return length > 0.0 ? glm::vec3(exact / length) : glm::vec3(0.0F);
+glm::vec3 small_triangle_normal(glm::vec3 a, glm::vec3 b, glm::vec3 c) {
+  const glm::dvec3 n = glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a));
+  const double length = glm::length(n);
+  return length > 0.0 ? glm::vec3(n / length) : glm::vec3(0.0F);
 }
 
 namespace {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
@@ -53,8 +55,14 @@ struct SurfaceDifferential {
 SurfaceDifferential surface_differential(const Scene& scene, const RayScene& rays, const Surface& surface,
                                          float distance, glm::vec3 ddirection);
 
+/// `triangle_normal` in double: with edges below a tenth of a millimetre the square underflows in float.
+glm::vec3 small_triangle_normal(glm::vec3 a, glm::vec3 b, glm::vec3 c);
 /// Unit normal of the side from which the corners are counter-clockwise; 0 if the triangle has no area.
-glm::vec3 triangle_normal(glm::vec3 a, glm::vec3 b, glm::vec3 c);
+inline glm::vec3 triangle_normal(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+  const glm::vec3 n = glm::cross(b - a, c - a);
+  const float square = glm::dot(n, n);
+  return square > 1e-30F && square < 1e30F ? n / std::sqrt(square) : small_triangle_normal(a, b, c);
+}
 
 inline float luminance(glm::vec3 c) { return 0.2126F * c.x + 0.7152F * c.y + 0.0722F * c.z; }
 

@@ -14,84 +14,85 @@ namespace mirrorbake::MIRRORBAKE_ISA {
 namespace {
 
 #if defined(__AVX512F__)
-constexpr std::size_t kLanes = 8;
+constexpr std::size_t kBytes = 64;
 #elif defined(__AVX__)
-constexpr std::size_t kLanes = 4;
+constexpr std::size_t kBytes = 32;
 #else
-constexpr std::size_t kLanes = 2;
+constexpr std::size_t kBytes = 16;
 #endif
 
-typedef double Doubles __attribute__((vector_size(8 * kLanes)));
+// Boxes are small, so that floats hold positions in them to 1e-6 of a texel.
+typedef float Floats __attribute__((vector_size(kBytes)));
+constexpr std::size_t kLanes = sizeof(Floats) / sizeof(float);
 
-inline Doubles all(double v) { return Doubles{} + v; }
-inline Doubles smaller(Doubles a, Doubles b) { return a < b ? a : b; }
-inline Doubles larger(Doubles a, Doubles b) { return a > b ? a : b; }
-inline Doubles within(Doubles v, Doubles low, Doubles high) { return smaller(larger(v, low), high); }
-inline Doubles magnitude(Doubles v) { return v < 0.0 ? -v : v; }
+inline Floats all(float v) { return Floats{} + v; }
+inline Floats smaller(Floats a, Floats b) { return a < b ? a : b; }
+inline Floats larger(Floats a, Floats b) { return a > b ? a : b; }
+inline Floats within(Floats v, Floats low, Floats high) { return smaller(larger(v, low), high); }
+inline Floats magnitude(Floats v) { return v < 0.0F ? -v : v; }
 
 struct Points {
-  Doubles x;
-  Doubles y;
+  Floats x;
+  Floats y;
 };
 
-// The part of an edge in a row of cells, from its upper side.
+// The part of an edge in a row of cells, y from its upper side.
 struct Piece {
   Points from;
   Points to;
-  Doubles x_per_y;
-  Doubles per_length;  // 1 / (to.x − from.x), or 0 if that is a rounding error
+  Floats x_per_y;
+  Floats per_length;  // 1 / (to.x − from.x), or 0 if that is a rounding error
 };
 
-constexpr double kUpright = 1e-9;
+constexpr float kUpright = 1e-6F;
 
 struct Edges {
   explicit Edges(const Points (&corners)[4]) {
     for (int e = 0; e < 4; ++e) {
       from[e] = corners[e];
       to[e] = corners[(e + 1) % 4];
-      const Doubles height = to[e].y - from[e].y;
-      const Doubles flat = all(0.0);
-      slope[e] = magnitude(height) > 1e-12 ? (to[e].x - from[e].x) / height : flat;
+      const Floats height = to[e].y - from[e].y;
+      const Floats flat = all(0.0F);
+      slope[e] = magnitude(height) > 1e-12F ? (to[e].x - from[e].x) / height : flat;
     }
   }
 
-  // Rows and columns are 1 high and wide.
-  Piece in_row(int e, double row) const {
+  // Rows are 1 high.
+  Piece in_row(int e, float row) const {
     Piece piece;
-    piece.from.y = within(from[e].y, all(row), all(row + 1.0));
-    piece.to.y = within(to[e].y, all(row), all(row + 1.0));
-    piece.from.x = from[e].x + (piece.from.y - from[e].y) * slope[e];
-    piece.to.x = from[e].x + (piece.to.y - from[e].y) * slope[e];
-    const Doubles length = piece.to.x - piece.from.x;
-    piece.per_length = magnitude(length) > kUpright ? 1.0 / length : all(0.0);
+    const Floats y = from[e].y - row;
+    piece.from.y = within(y, all(0.0F), all(1.0F));
+    piece.to.y = within(to[e].y - row, all(0.0F), all(1.0F));
+    piece.from.x = from[e].x + (piece.from.y - y) * slope[e];
+    piece.to.x = from[e].x + (piece.to.y - y) * slope[e];
+    const Floats length = piece.to.x - piece.from.x;
+    piece.per_length = magnitude(length) > kUpright ? 1.0F / length : all(0.0F);
     return piece;
   }
 
   Points from[4];
   Points to[4];
-  Doubles slope[4];
+  Floats slope[4];
 };
 
 // How much of each cell is covered.
-void find_coverage(const Points (&corners)[4], std::uint32_t rows, std::uint32_t columns, Doubles* areas) {
+void find_coverage(const Points (&corners)[4], std::uint32_t rows, std::uint32_t columns, Floats* areas) {
   const Edges edges(corners);
   for (std::uint32_t row = 0; row < rows; ++row) {
     Piece pieces[4];
-    for (int e = 0; e < 4; ++e) pieces[e] = edges.in_row(e, row);
+    for (int e = 0; e < 4; ++e) pieces[e] = edges.in_row(e, static_cast<float>(row));
     for (std::uint32_t column = 0; column < columns; ++column) {
-      const Doubles left = all(column);
-      const auto inside = [](Doubles x) { return within(x, all(0.0), all(1.0)); };
-      Doubles area = all(0.0);
+      const Floats left = all(static_cast<float>(column));
+      Floats area = all(0.0F);
       for (const Piece& piece : pieces) {
-        // The mean of inside(x) along the piece is the difference of its integrals, u (x − u/2), over their distance.
-        const Doubles a = piece.from.x - left;
-        const Doubles b = piece.to.x - left;
-        const Doubles u = inside(a);
-        const Doubles v = inside(b);
-        const Doubles mean = piece.per_length != 0.0
-                                 ? (v * (b - 0.5 * v) - u * (a - 0.5 * u)) * piece.per_length
-                                 : 0.5 * (u + v);
-        area += mean * (piece.to.y - piece.from.y);
+        // Before u and after v the piece is beyond the cell's sides.
+        const Floats a = piece.from.x - left;
+        const Floats b = piece.to.x - left;
+        const Floats u = within(a, all(0.0F), all(1.0F));
+        const Floats v = within(b, all(0.0F), all(1.0F));
+        const Floats middle = 0.5F * (u + v);
+        const Floats mean = ((u - a) * u + (v - u) * middle + (b - v) * v) * piece.per_length;
+        area += (piece.per_length != 0.0F ? mean : middle) * (piece.to.y - piece.from.y);
       }
       *areas++ = area;
     }
@@ -99,58 +100,58 @@ void find_coverage(const Points (&corners)[4], std::uint32_t rows, std::uint32_t
 }
 
 struct Moments {
-  Doubles area;  // ∫ 1, ∫ x, ∫ y and ∫ xy, x and y from the cell's corner above left
-  Doubles x;
-  Doubles y;
-  Doubles xy;
+  Floats area;  // ∫ 1, ∫ x, ∫ y and ∫ xy, x and y from the cell's corner above left
+  Floats x;
+  Floats y;
+  Floats xy;
 };
 
-// Integrals over the part of the cell (row, column) that is on the left of a piece.
-inline void add_moments(const Piece& piece, double row, double column, Moments& sum) {
-  const Doubles zero = all(0.0);
-  const Doubles one = all(1.0);
-  const Doubles ax = piece.from.x - column;
-  const Doubles ay = piece.from.y - row;
-  const Doubles bx = piece.to.x - column;
-  const Doubles by = piece.to.y - row;
+// Integrals over the part of a cell of the row that is on the left of a piece.
+inline void add_moments(const Piece& piece, float column, Moments& sum) {
+  const Floats zero = all(0.0F);
+  const Floats one = all(1.0F);
+  const Floats ax = piece.from.x - column;
+  const Floats ay = piece.from.y;
+  const Floats bx = piece.to.x - column;
+  const Floats by = piece.to.y;
   // Before (ux, uy) and after (vx, vy) the piece is beyond the cell's sides.
-  const Doubles ux = within(ax, zero, one);
-  const Doubles vx = within(bx, zero, one);
-  const Doubles y_per_x = (by - ay) * piece.per_length;
-  const Doubles low = smaller(ay, by);
-  const Doubles high = larger(ay, by);
-  const Doubles uy = within(ay + (ux - ax) * y_per_x, low, high);
-  const Doubles vy = within(by + (vx - bx) * y_per_x, low, high);
+  const Floats ux = within(ax, zero, one);
+  const Floats vx = within(bx, zero, one);
+  const Floats y_per_x = (by - ay) * piece.per_length;
+  const Floats low = smaller(ay, by);
+  const Floats high = larger(ay, by);
+  const Floats uy = within(ay + (ux - ax) * y_per_x, low, high);
+  const Floats vy = within(by + (vx - bx) * y_per_x, low, high);
   // There x is 0 or 1, so that x² is x.
-  const Doubles outer = ux * (uy - ay) + vx * (by - vy);
-  const Doubles outer_y = 0.5 * (ux * (uy * uy - ay * ay) + vx * (by * by - vy * vy));
-  const Doubles dx = vx - ux;
-  const Doubles dy = vy - uy;
-  const Doubles x = 0.5 * (ux + vx);
-  const Doubles y = 0.5 * (uy + vy);
-  const Doubles x2 = x * x + dx * dx * (1.0 / 12.0);
+  const Floats outer = ux * (uy - ay) + vx * (by - vy);
+  const Floats outer_y = 0.5F * (ux * (uy * uy - ay * ay) + vx * (by * by - vy * vy));
+  const Floats dx = vx - ux;
+  const Floats dy = vy - uy;
+  const Floats x = 0.5F * (ux + vx);
+  const Floats y = 0.5F * (uy + vy);
+  const Floats x2 = x * x + dx * dx * (1.0F / 12.0F);
   sum.area += outer + x * dy;
-  sum.x += 0.5 * (outer + x2 * dy);
-  sum.y += outer_y + (x * y + dx * dy * (1.0 / 12.0)) * dy;
-  sum.xy += 0.5 * (outer_y + (y * x2 + x * dx * dy * (1.0 / 6.0)) * dy);
+  sum.x += 0.5F * (outer + x2 * dy);
+  sum.y += outer_y + (x * y + dx * dy * (1.0F / 12.0F)) * dy;
+  sum.xy += 0.5F * (outer_y + (y * x2 + x * dx * dy * (1.0F / 6.0F)) * dy);
 }
 
 // Integrals of the bilinear interpolation between the corners of cells: weights of the corners. In a cell they are
 // products of x, y, 1 − x and 1 − y, x and y from its corner above left.
 template <typename RowWeight>
 void find_interpolation(const Points (&corners)[4], std::uint32_t rows, std::uint32_t columns,
-                        const RowWeight& row_weight, Doubles* weights) {
+                        const RowWeight& row_weight, Floats* weights) {
   const Edges edges(corners);
-  for (std::uint32_t i = 0; i < rows * columns; ++i) weights[i] = all(0.0);
+  for (std::uint32_t i = 0; i < rows * columns; ++i) weights[i] = all(0.0F);
   for (std::uint32_t row = 0; row + 1 < rows; ++row) {
     Piece pieces[4];
-    for (int e = 0; e < 4; ++e) pieces[e] = edges.in_row(e, row);
+    for (int e = 0; e < 4; ++e) pieces[e] = edges.in_row(e, static_cast<float>(row));
     // Of a cell, where the rows have different solid angles.
-    const Doubles weight = 0.5 * (row_weight(row) + row_weight(row + 1));
+    const Floats weight = 0.5F * (row_weight(row) + row_weight(row + 1));
     for (std::uint32_t column = 0; column + 1 < columns; ++column) {
       Moments sum = {};
-      for (const Piece& piece : pieces) add_moments(piece, row, column, sum);
-      Doubles* w = weights + row * columns + column;
+      for (const Piece& piece : pieces) add_moments(piece, static_cast<float>(column), sum);
+      Floats* w = weights + row * columns + column;
       w[0] += weight * (sum.area - sum.x - sum.y + sum.xy);
       w[1] += weight * (sum.x - sum.xy);
       w[columns] += weight * (sum.y - sum.xy);
@@ -159,39 +160,42 @@ void find_interpolation(const Points (&corners)[4], std::uint32_t rows, std::uin
   }
 }
 
-Doubles sum_of(const Doubles* values, std::size_t count) {
-  Doubles sum = all(0.0);
+Floats sum_of(const Floats* values, std::size_t count) {
+  Floats sum = all(0.0F);
   for (std::size_t i = 0; i < count; ++i) sum += values[i];
   return sum;
 }
 
 // Σ (−z)^k / (2k + 1)! is sin(√z)/√z, and z ≤ 2π² on an angular map's square: what is left out is below 1e-11.
-inline Doubles sine_quotient(Doubles z) {
-  Doubles p = all(1.0);
-  for (int k = 13; k > 0; --k) p = 1.0 - z * p * (1.0 / (2.0 * k * (2.0 * k + 1.0)));
+inline Floats sine_quotient(Floats z) {
+  Floats p = all(1.0F);
+  for (int k = 13; k > 0; --k) p = 1.0F - z * p * (1.0F / static_cast<float>(2 * k * (2 * k + 1)));
   return magnitude(p);
 }
 
-inline Doubles root(Doubles v) {
-  for (std::size_t lane = 0; lane < kLanes; ++lane) v[lane] = __builtin_sqrt(v[lane]);
+inline Floats root(Floats v) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) v[lane] = __builtin_sqrtf(v[lane]);
   return v;
 }
 
 // Of texels at their distance from the centre of the face, squared.
-Doubles density_at(const TexelDensity& density, Doubles radius2) {
+Floats density_at(const TexelDensity& density, Floats radius2) {
   switch (density.kind) {
     case TexelDensity::equal: break;
     case TexelDensity::cube: {
-      const Doubles q = 1.0 + radius2;
-      return 1.0 / (q * root(q));
+      const Floats q = 1.0F + radius2;
+      return 1.0F / (q * root(q));
     }
     case TexelDensity::paraboloid: {
-      const Doubles q = 1.0 + radius2;
-      return 1.0 / (q * q);
+      const Floats q = 1.0F + radius2;
+      return 1.0F / (q * q);
     }
-    case TexelDensity::fisheye: return sine_quotient(density.half_angle * density.half_angle * radius2);
+    case TexelDensity::fisheye: {
+      const float angle = static_cast<float>(density.half_angle);
+      return sine_quotient(angle * angle * radius2);
+    }
   }
-  return all(1.0);
+  return all(1.0F);
 }
 
 // As many texels as there are lanes; the last ones may be the same.
@@ -204,57 +208,59 @@ class Batch {
       const std::size_t i = texels[lane < count ? lane : count - 1];
       left_[lane] = boxes.left[i];
       top_[lane] = boxes.top[i];
-      share_[lane] = static_cast<double>(tile.shares[i]);
+      share_[lane] = tile.shares[i];
       const std::size_t numbers[4] = {i, i + 1, i + tile.pitch + 1, i + tile.pitch};
       for (int corner = 0; corner < 4; ++corner) {
-        corners_[corner].x[lane] = tile.corners.x[numbers[corner]] - boxes.left[i];
-        corners_[corner].y[lane] = tile.corners.y[numbers[corner]] - boxes.top[i];
+        corners_[corner].x[lane] = static_cast<float>(tile.corners.x[numbers[corner]] - boxes.left[i]);
+        corners_[corner].y[lane] = static_cast<float>(tile.corners.y[numbers[corner]] - boxes.top[i]);
       }
     }
   }
 
-  void find(std::uint8_t kind, std::uint32_t rows, std::uint32_t columns, Doubles* weights) const {
+  void find(const BoxShape& shape, Floats* weights) const {
+    const auto [rows, columns, face, kind] = shape;
     const std::size_t count = static_cast<std::size_t>(rows) * columns;
     if (kind == kArea) {
       find_area(rows, columns, weights);
-      return scale(weights, count, all(1.0));
+      return scale(weights, count, all(1.0F));
     }
     Points from_centers[4];
     for (int corner = 0; corner < 4; ++corner) {
-      from_centers[corner] = {corners_[corner].x - 0.5, corners_[corner].y - 0.5};
+      from_centers[corner] = {corners_[corner].x - 0.5F, corners_[corner].y - 0.5F};
     }
     find_interpolation(
         from_centers, rows, columns, [&](std::uint32_t row) { return row_weight(row); }, weights);
-    if (kind == kInterpolate) return scale(weights, count, all(1.0));
-    Doubles areas[kMostBlockTaps];
+    if (kind == kInterpolate) return scale(weights, count, all(1.0F));
+    Floats areas[kMostBlockTaps];
     find_area(rows, columns, areas);
-    scale(areas, count, 1.0 - share_);
+    scale(areas, count, 1.0F - share_);
     scale(weights, count, share_);
     for (std::size_t i = 0; i < count; ++i) weights[i] += areas[i];
   }
 
  private:
-  // Down to rounding errors: these are nothing.
-  static void scale(Doubles* weights, std::size_t count, Doubles sum) {
-    const Doubles factor = sum / sum_of(weights, count);
+  static void scale(Floats* weights, std::size_t count, Floats sum) {
+    constexpr float kRounding = 1e-8F;  // is nothing, also where a light is
+    const Floats factor = sum / sum_of(weights, count);
     for (std::size_t i = 0; i < count; ++i) {
-      const Doubles weight = factor * weights[i];
-      weights[i] = weight > 1e-9 ? weight : all(0.0);
+      const Floats weight = factor * weights[i];
+      weights[i] = weight > kRounding ? weight : all(0.0F);
     }
   }
 
-  Doubles row_weight(std::uint32_t row) const {
-    Doubles weight = all(1.0);
+  Floats row_weight(std::uint32_t row) const {
+    Floats weight = all(1.0F);
     if (source_.by_row == nullptr) return weight;
-    for (std::size_t lane = 0; lane < kLanes; ++lane) weight[lane] = source_.by_row[top_[lane] + row];
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      weight[lane] = static_cast<float>(source_.by_row[top_[lane] + static_cast<std::int32_t>(row)]);
     return weight;
   }
 
-  void find_area(std::uint32_t rows, std::uint32_t columns, Doubles* weights) const {
+  void find_area(std::uint32_t rows, std::uint32_t columns, Floats* weights) const {
     find_coverage(corners_, rows, columns, weights);
     if (source_.by_row != nullptr) {
       for (std::uint32_t row = 0; row < rows; ++row) {
-        const Doubles weight = row_weight(row);
+        const Floats weight = row_weight(row);
         for (std::uint32_t column = 0; column < columns; ++column) *weights++ *= weight;
       }
     } else if (source_.by_texel != nullptr) {
@@ -264,44 +270,45 @@ class Batch {
             const std::ptrdiff_t texel =
                 (top_[lane] + row) * static_cast<std::ptrdiff_t>(source_.density.width) + left_[lane] +
                 column;
-            (*weights)[lane] *= source_.by_texel[texel];
+            (*weights)[lane] *= static_cast<float>(source_.by_texel[texel]);
           }
         }
       }
     } else if (source_.density.kind != TexelDensity::equal) {
-      const Doubles left = __builtin_convertvector(left_, Doubles) + 0.5;
-      const Doubles top = __builtin_convertvector(top_, Doubles) + 0.5;
+      const float per_row = 2.0F / static_cast<float>(source_.density.height);
+      const float per_column = 2.0F / static_cast<float>(source_.density.width);
+      const Floats left = __builtin_convertvector(left_, Floats) + 0.5F;
+      const Floats top = __builtin_convertvector(top_, Floats) + 0.5F;
       for (std::uint32_t row = 0; row < rows; ++row) {
-        const Doubles y = (top + static_cast<double>(row)) * (2.0 / source_.density.height) - 1.0;
+        const Floats y = (top + static_cast<float>(row)) * per_row - 1.0F;
         for (std::uint32_t column = 0; column < columns; ++column) {
-          const Doubles x = (left + static_cast<double>(column)) * (2.0 / source_.density.width) - 1.0;
+          const Floats x = (left + static_cast<float>(column)) * per_column - 1.0F;
           *weights++ *= density_at(source_.density, x * x + y * y);
         }
       }
     }
   }
 
-  typedef std::int64_t Indices __attribute__((vector_size(8 * kLanes)));
+  typedef std::int32_t Indices __attribute__((vector_size(kBytes)));
 
   const TexelWeights& source_;
   Points corners_[4];  // from the corner of the box above left
   Indices left_;
   Indices top_;
-  Doubles share_;
+  Floats share_;
 };
 
 }  // namespace
 
 void find_weights(const TileImages& tile, const BoxArrays& boxes, const TexelWeights& source,
-                  std::uint8_t kind, const std::uint32_t* texels, std::size_t count, std::uint32_t rows,
-                  std::uint32_t columns, float* weights) {
-  const std::size_t size = static_cast<std::size_t>(rows) * columns;
-  Doubles found[kMostBlockTaps];
+                  const BoxShape& shape, const std::uint32_t* texels, std::size_t count, float* weights) {
+  const std::size_t size = static_cast<std::size_t>(shape.rows) * shape.columns;
+  Floats found[kMostBlockTaps];
   for (std::size_t first = 0; first < count; first += kLanes) {
     const std::size_t lanes = count - first < kLanes ? count - first : kLanes;
-    Batch(tile, boxes, source, texels + first, lanes).find(kind, rows, columns, found);
+    Batch(tile, boxes, source, texels + first, lanes).find(shape, found);
     for (std::size_t lane = 0; lane < lanes; ++lane) {
-      for (std::size_t i = 0; i < size; ++i) *weights++ = static_cast<float>(found[i][lane]);
+      for (std::size_t i = 0; i < size; ++i) *weights++ = found[i][lane];
     }
   }
 }

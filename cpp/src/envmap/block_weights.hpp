@@ -6,7 +6,6 @@ namespace mirrorbake::MIRRORBAKE_ISA {
 
 /// ResampleKernels::find_weights().
 void find_weights(const TileImages& tile, const BoxArrays& boxes, const TexelWeights& source,
-                  std::uint8_t kind, const std::uint32_t* texels, std::size_t count, std::uint32_t rows,
-                  std::uint32_t columns, float* weights);
+                  const BoxShape& shape, const std::uint32_t* texels, std::size_t count, float* weights);
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

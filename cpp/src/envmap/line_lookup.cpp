@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include <glm/trigonometric.hpp>
+
 namespace mirrorbake {
 
 LineTables::LineTables(const Projection& target, std::vector<double> x_) : x(std::move(x_)) {
@@ -77,14 +79,23 @@ void LineLookup::set_directions(int face, double y, std::size_t first, std::size
       r = glm::dvec3(0.0, 0.0, -front);
       break;
     }
-    default:
+    case ProjectionKind::angular:
+    case ProjectionKind::fisheye: {
+      const double half_angle = target.kind == ProjectionKind::angular
+                                    ? std::numbers::pi
+                                    : 0.5 * glm::radians(static_cast<double>(target.field_of_view));
+      resample_kernels().fisheye_directions(tables_.x.data() + first, y, half_angle, count, dx_.data(),
+                                            dy_.data(), dz_.data());
+      return turn(count);
+    }
+    case ProjectionKind::sphere_map:
       for (std::size_t i = 0; i < count; ++i) {
-        const glm::dvec3 d = job_.source_from_target * at(tables_.x[first + i]);
+        const glm::dvec3 d = at(tables_.x[first + i]);
         dx_[i] = d.x;
         dy_[i] = d.y;
         dz_[i] = d.z;
       }
-      return;
+      return turn(count);
   }
   p = job_.source_from_target * p;
   q = job_.source_from_target * q;
@@ -93,6 +104,15 @@ void LineLookup::set_directions(int face, double y, std::size_t first, std::size
     dx_[i] = p.x + tables_.u[first + i] * q.x + tables_.v[first + i] * r.x;
     dy_[i] = p.y + tables_.u[first + i] * q.y + tables_.v[first + i] * r.y;
     dz_[i] = p.z + tables_.u[first + i] * q.z + tables_.v[first + i] * r.z;
+  }
+}
+
+void LineLookup::turn(std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 d = job_.source_from_target * glm::dvec3(dx_[i], dy_[i], dz_[i]);
+    dx_[i] = d.x;
+    dy_[i] = d.y;
+    dz_[i] = d.z;
   }
 }
 

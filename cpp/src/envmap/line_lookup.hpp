@@ -43,6 +43,7 @@ class LineLookup {
 
  private:
   void set_directions(int face, double y, std::size_t first, std::size_t count);
+  void turn(std::size_t count);
 
   const ResampleJob& job_;
   const LineTables& tables_;

@@ -47,6 +47,24 @@ inline double angle(double y, double x) {
   return __builtin_copysign(a, y);
 }
 
+// By the series of sin(a)/a and cos(a) in a², which is at most 2π²: what is left out is below 1e-11.
+void fisheye_directions(const double* __restrict x, double y, double half_angle, std::size_t count,
+                        double* __restrict dx, double* __restrict dy, double* __restrict dz) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const double z = half_angle * half_angle * (x[i] * x[i] + y * y);
+    double sine = 1.0;
+    double cosine = 1.0;
+#pragma GCC unroll 13
+    for (int k = 13; k > 0; --k) {
+      sine = 1.0 - z * sine * (1.0 / (2 * k * (2 * k + 1)));
+      cosine = 1.0 - z * cosine * (1.0 / (2 * k * (2 * k - 1)));
+    }
+    dx[i] = half_angle * sine * x[i];
+    dy[i] = half_angle * sine * y;
+    dz[i] = -cosine;
+  }
+}
+
 void latlong_positions(const double* __restrict dx, const double* __restrict dy, const double* __restrict dz,
                        std::size_t count, int width, int height, const PositionArrays& result) {
   double* __restrict x = result.x;
@@ -135,7 +153,7 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
     const double side = __builtin_sqrt(area + long_share * (wide2 - area));
     const bool straight =
         (magnitude(bend_x) + magnitude(bend_y) < larger(kStraightBend, per_length * longest)) &
-        (shift <= most_shift * cross) & (longest < farthest) & (side > 1e-6);
+        (shift <= most_shift * cross) & (longest < farthest) & (side > 1e-3);
     // Above 0 from one texel down, 1 from three quarters down, and smooth in between: where it bends, the one
     // filter takes what the other does not give.
     double share = automatic ? 4.0 - 4.0 * side : 0.0;
@@ -171,30 +189,43 @@ inline std::int32_t floor_of(double v) {
   return static_cast<double>(i) > v ? i - 1 : i;
 }
 
-// Of pixels, or of the corners of cells with texels' centres for corners. Edges that rounding has put a bit beyond a
-// side do not count.
+// Of pixels, or of the corners of cells with texels' centres for corners. Edges that rounding has put a bit
+// beyond a side do not count.
 void find_boxes(const PositionArrays& above, const PositionArrays& below,
-                const std::uint8_t* __restrict kinds, std::size_t count, const BoxArrays& boxes) {
+                const std::uint8_t* __restrict kinds, std::size_t count, const FaceSize& face,
+                const BoxArrays& boxes) {
   constexpr double kRounding = 1e-9;
+  constexpr std::int32_t kMost = static_cast<std::int32_t>(kMostBlockTaps);
   const double* __restrict ax = above.x;
   const double* __restrict ay = above.y;
   const double* __restrict bx = below.x;
   const double* __restrict by = below.y;
-  std::int32_t* __restrict left = boxes.left;
-  std::int32_t* __restrict top = boxes.top;
-  std::int32_t* __restrict columns = boxes.columns;
-  std::int32_t* __restrict rows = boxes.rows;
+  const std::int32_t* __restrict faces = above.face;
+  std::int32_t* __restrict lefts = boxes.left;
+  std::int32_t* __restrict tops = boxes.top;
+  std::uint32_t* __restrict shapes = boxes.shapes;
+  const std::int32_t width = face.width;
+  const std::int32_t height = face.height;
+  const bool periodic = face.is_periodic;
   for (std::size_t i = 0; i < count; ++i) {
-    const double offset = kinds[i] & kInterpolate ? 0.5 : 0.0;
-    const std::int32_t more = kinds[i] & kInterpolate ? 1 : 0;
+    const std::int32_t kind = kinds[i];
+    const double offset = kind & kInterpolate ? 0.5 : 0.0;
+    const std::int32_t more = kind & kInterpolate ? 1 : 0;
     const double inset = kRounding - offset;
     const double outset = kRounding + offset;
-    left[i] = floor_of(least(ax[i], ax[i + 1], bx[i], bx[i + 1]) + inset);
-    top[i] = floor_of(least(ay[i], ay[i + 1], by[i], by[i + 1]) + inset);
-    const std::int32_t right = floor_of(greatest(ax[i], ax[i + 1], bx[i], bx[i + 1]) - outset) + 1 + more;
-    const std::int32_t bottom = floor_of(greatest(ay[i], ay[i + 1], by[i], by[i + 1]) - outset) + 1 + more;
-    columns[i] = right > left[i] + more ? right - left[i] : 1 + more;
-    rows[i] = bottom > top[i] + more ? bottom - top[i] : 1 + more;
+    const std::int32_t left = floor_of(least(ax[i], ax[i + 1], bx[i], bx[i + 1]) + inset);
+    const std::int32_t top = floor_of(least(ay[i], ay[i + 1], by[i], by[i + 1]) + inset);
+    const std::int32_t right = floor_of(greatest(ax[i], ax[i + 1], bx[i], bx[i + 1]) - outset) + more;
+    const std::int32_t bottom = floor_of(greatest(ay[i], ay[i + 1], by[i], by[i + 1]) - outset) + more;
+    const std::int32_t columns = (right > left + more ? right : left + more) - left + 1;
+    const std::int32_t rows = (bottom > top + more ? bottom : top + more) - top + 1;
+    const bool beside = (left < 0) | (left + columns > width);
+    const bool fits = (kind != kIrregular) & (top >= 0) & (top + rows <= height) & (columns <= width) &
+                      (columns <= kMost) & (rows <= kMost) & (rows * columns <= kMost) & (periodic | !beside);
+    lefts[i] = left;
+    tops[i] = top;
+    const std::int32_t shape = rows | columns << 10 | faces[i] << 20 | kind << 24;
+    shapes[i] = fits ? static_cast<std::uint32_t>(shape) : 0U;
   }
 }
 
@@ -408,8 +439,9 @@ void apply_taps(const float* values, int channels, const std::uint32_t* taps, co
 
 }  // namespace
 
-extern const ResampleKernels kResampleKernels = {latlong_positions, cube_positions, dual_paraboloid_positions,
-                                                 classify,          find_boxes,     find_weights,
-                                                 number_texels,     apply_blocks,   apply_taps};
+extern const ResampleKernels kResampleKernels = {
+    fisheye_directions, latlong_positions, cube_positions, dual_paraboloid_positions,
+    classify,           find_boxes,        find_weights,   number_texels,
+    apply_blocks,       apply_taps};
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

@@ -74,13 +74,34 @@ struct TileImages {
   const float* shares;  ///< of interpolation
 };
 
-/// The rectangle of texels of the source that a texel of the target reads, by the same numbers. Rows and
-/// columns may lie beyond the face.
+/// The rectangle of texels of the source that a texel of the target reads, by the same numbers.
 struct BoxArrays {
-  std::int32_t* left;
+  std::int32_t* left;  ///< of a panorama, where columns go on across the seam
   std::int32_t* top;
-  std::int32_t* columns;
-  std::int32_t* rows;
+  std::uint32_t* shapes;  ///< BoxShape, or 0 if it is not on the face, or large
+};
+
+/// Texels of the same shape are treated alike.
+struct BoxShape {
+  std::uint32_t rows;
+  std::uint32_t columns;
+  std::int32_t face;
+  std::uint8_t kind;
+};
+constexpr std::uint32_t pack(const BoxShape& s) {
+  return s.rows | s.columns << 10U | static_cast<std::uint32_t>(s.face) << 20U |
+         static_cast<std::uint32_t>(s.kind) << 24U;
+}
+constexpr BoxShape unpack(std::uint32_t shape) {
+  return {shape & 1023U, shape >> 10U & 1023U, static_cast<std::int32_t>(shape >> 20U & 15U),
+          static_cast<std::uint8_t>(shape >> 24U)};
+}
+
+/// Of a face of the source. A panorama's columns go on across its seam.
+struct FaceSize {
+  std::int32_t width;
+  std::int32_t height;
+  bool is_periodic;
 };
 
 /// Solid angles of the texels of a face, up to a factor: by row or by texel, row by row, if either is not null.
@@ -95,6 +116,11 @@ using PositionLoop = void (*)(const double* dx, const double* dy, const double* 
                               int width, int height, const PositionArrays& result);
 
 struct ResampleKernels {
+  /// Directions of points (x, y) of a fisheye map with this half of the field of view, in radians; beyond the
+  /// rim, too, up to the corners of the square.
+  void (*fisheye_directions)(const double* x, double y, double half_angle, std::size_t count, double* dx,
+                             double* dy, double* dz);
+
   PositionLoop latlong_positions;
   PositionLoop cube_positions;
   PositionLoop dual_paraboloid_positions;
@@ -105,15 +131,14 @@ struct ResampleKernels {
   std::uint8_t (*classify)(const PositionArrays& above, const PositionArrays& below, std::size_t count,
                            const StraightLimits& limits, bool automatic, std::uint8_t* kinds, float* shares);
 
-  /// Boxes of a row of texels that are not irregular.
+  /// Boxes of a row of texels.
   void (*find_boxes)(const PositionArrays& above, const PositionArrays& below, const std::uint8_t* kinds,
-                     std::size_t count, const BoxArrays& boxes);
+                     std::size_t count, const FaceSize& face, const BoxArrays& boxes);
 
-  /// Weights of the `rows` × `columns` texels in the boxes of some texels of one kind, one texel after the other:
-  /// each texel's add up to 1. Every box has to lie on the face, but for columns of a panorama.
+  /// Weights of the texels of the source in the boxes of texels of one shape, one after the other: each one's
+  /// add up to 1.
   void (*find_weights)(const TileImages& tile, const BoxArrays& boxes, const TexelWeights& source,
-                       std::uint8_t kind, const std::uint32_t* texels, std::size_t count, std::uint32_t rows,
-                       std::uint32_t columns, float* weights);
+                       const BoxShape& shape, const std::uint32_t* texels, std::size_t count, float* weights);
 
   /// Numbers of texels. Returns the largest.
   std::uint32_t (*number_texels)(const TexelNumbering& numbering, const std::uint16_t* rows,

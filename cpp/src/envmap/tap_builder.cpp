@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace mirrorbake {
 namespace {
@@ -90,7 +91,9 @@ void TapBuilder::build(const Tile& tile, TapChunk& chunk) {
   const std::size_t size = corner(tile_.rows + 1, 0);
   kinds_.resize(size);
   shares_.resize(size);
-  for (std::vector<std::int32_t>* box : {&left_, &top_, &columns_, &rows_}) box->resize(size);
+  left_.resize(size);
+  top_.resize(size);
+  box_shapes_.resize(size);
   positions_.resize(size);
   if (looks_at_centers(job_.filter)) {
     find_centers();
@@ -99,8 +102,8 @@ void TapBuilder::build(const Tile& tile, TapChunk& chunk) {
     classify();
   }
   find_blocks(chunk);
-  sort_blocks();
-  add_blocks(chunk.blocks);
+  sort_blocks(chunk.blocks);
+  weigh_blocks(chunk.blocks);
 }
 
 // Marks the texels that no symmetry takes to one before them, and sets the present tile to the rectangle
@@ -183,21 +186,23 @@ void TapBuilder::find_corners() {
 
 void TapBuilder::classify() {
   const std::size_t columns = static_cast<std::size_t>(tile_.columns);
+  const FaceSize face{job_.width(), job_.height(), job_.is_periodic()};
   const ProjectionKind kind = job_.target.projection.kind;
-  const bool round = kind != ProjectionKind::cube && kind != ProjectionKind::latlong;
+  const bool on_rim = disc_extent(kind, target_corner(0, 0), target_corner(tile_.rows, tile_.columns)) ==
+                      DiscExtent::crosses_rim;
   for (int row = 0; row < tile_.rows; ++row) {
     const std::size_t first = corner(row, 0);
     const PositionArrays above = positions_.from(first);
     const PositionArrays below = positions_.from(corner(row + 1, 0));
     kernels_.classify(above, below, columns, limits_, job_.filter == ResampleFilter::automatic,
                       kinds_.data() + first, shares_.data() + first);
-    kernels_.find_boxes(above, below, kinds_.data() + first, columns, boxes_from(first));
-    for (int column = 0; column < tile_.columns && round; ++column) {
+    for (int column = 0; column < tile_.columns && on_rim; ++column) {
       if (disc_extent(kind, target_corner(row, column), target_corner(row + 1, column + 1)) ==
           DiscExtent::crosses_rim) {
         kinds_[corner(row, column)] = kIrregular;
       }
     }
+    kernels_.find_boxes(above, below, kinds_.data() + first, columns, face, boxes_from(first));
   }
 }
 
@@ -209,6 +214,7 @@ void TapBuilder::find_centers() {
                  static_cast<std::size_t>(tile_.columns), positions_, corner(row, 0));
     for (int column = 0; column < tile_.columns; ++column) {
       const std::size_t i = corner(row, column);
+      const int size = nearest ? 1 : 2;
       if (nearest) {
         left_[i] = std::min(static_cast<int>(positions_.x[i]), job_.width() - 1);
         top_[i] = std::min(static_cast<int>(positions_.y[i]), job_.height() - 1);
@@ -216,94 +222,92 @@ void TapBuilder::find_centers() {
         left_[i] = floor_of(positions_.x[i] - 0.5);
         top_[i] = floor_of(positions_.y[i] - 0.5);
       }
-      columns_[i] = rows_[i] = nearest ? 1 : 2;
-      kinds_[i] = positions_.face[i] < 0 ? +kIrregular : +kInterpolate;
+      const bool beside = left_[i] < 0 || left_[i] + size > job_.width();
+      const bool fits = positions_.face[i] >= 0 && top_[i] >= 0 && top_[i] + size <= job_.height() &&
+                        size <= job_.width() && (job_.is_periodic() || !beside);
+      const std::uint32_t length = static_cast<std::uint32_t>(size);
+      box_shapes_[i] = fits ? pack({length, length, positions_.face[i], kInterpolate}) : 0U;
     }
   }
 }
 
-// Whether all of its box is on the face.
-bool TapBuilder::is_block(std::size_t texel) const {
-  if (kinds_[texel] == kIrregular) return false;
-  const std::int32_t rows = rows_[texel];
-  const std::int32_t columns = columns_[texel];
-  constexpr std::int32_t kMost = static_cast<std::int32_t>(kMostBlockTaps);
-  if (rows > kMost || columns > kMost || rows * columns > kMost || columns > job_.width()) return false;
-  if (top_[texel] < 0 || top_[texel] + rows > job_.height()) return false;
-  return job_.is_periodic() || (left_[texel] >= 0 && left_[texel] + columns <= job_.width());
-}
-
 void TapBuilder::find_blocks(TapChunk& chunk) {
   shapes_.clear();
-  found_.clear();
-  std::size_t shape = 0;
+  counts_.clear();
+  blocks_.clear();
+  std::size_t k = 0;
   const std::uint8_t* first = first_.data();
   for (int row = 0; row < tile_.rows; ++row) {
     for (int column = 0; column < tile_.columns; ++column) {
       if (!*first++) continue;
       const std::size_t i = corner(row, column);
-      if (!is_block(i)) {
+      const std::uint32_t shape = box_shapes_[i];
+      if (shape == 0) {
         add_list(row, column, chunk);
         continue;
       }
-      const Shape wanted = {positions_.face[i], rows_[i], columns_[i], kinds_[i]};
-      if (shape == shapes_.size() || !(shapes_[shape] == wanted)) {
-        shape = static_cast<std::size_t>(std::find(shapes_.begin(), shapes_.end(), wanted) - shapes_.begin());
-        if (shape == shapes_.size()) shapes_.push_back(wanted);
+      if (k == shapes_.size() || shapes_[k] != shape) {
+        k = static_cast<std::size_t>(std::find(shapes_.begin(), shapes_.end(), shape) - shapes_.begin());
+        if (k == shapes_.size()) {
+          shapes_.push_back(shape);
+          counts_.push_back(0);
+        }
       }
-      ++shapes_[shape].count;
-      found_.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(shape)});
+      ++counts_[k];
+      blocks_.push_back({static_cast<std::uint32_t>(i), narrow(row), narrow(static_cast<int>(k))});
     }
   }
 }
 
-void TapBuilder::sort_blocks() {
+void TapBuilder::sort_blocks(TapChunk::Blocks& blocks) {
   std::uint32_t start = 0;
   starts_.clear();
-  for (const Shape& shape : shapes_) {
+  for (const std::uint32_t count : counts_) {
     starts_.push_back(start);
-    start += shape.count;
+    start += count;
   }
-  sorted_.resize(found_.size());
-  for (const Block& block : found_) sorted_[starts_[block.shape]++] = block.texel;
+  for (auto* values : {&blocks.rows, &blocks.columns, &blocks.target_rows, &blocks.target_columns}) {
+    values->resize(blocks_.size());
+  }
+  sorted_.resize(blocks_.size());
+  blocks.left = std::numeric_limits<int>::max();
+  blocks.right = std::numeric_limits<int>::min();
+  for (const Block& block : blocks_) {
+    const std::size_t to = starts_[block.shape]++;
+    const std::uint32_t i = block.texel;
+    const int left = left_[i];
+    blocks.left = std::min(blocks.left, left);
+    blocks.right = std::max(blocks.right, left + static_cast<int>(unpack(shapes_[block.shape]).columns));
+    const int turn = left < 0 ? job_.width() : left >= job_.width() ? -job_.width() : 0;
+    sorted_[to] = i;
+    blocks.rows[to] = narrow(top_[i]);
+    blocks.columns[to] = narrow(left + turn);
+    blocks.target_rows[to] = narrow(tile_.row + block.row);
+    blocks.target_columns[to] = narrow(tile_.column + static_cast<int>(i - corner(block.row, 0)));
+  }
 }
 
-void TapBuilder::add_blocks(TapChunk::Blocks& blocks) {
+void TapBuilder::weigh_blocks(TapChunk::Blocks& blocks) {
   std::size_t taps = 0;
-  for (const Shape& shape : shapes_)
-    taps += static_cast<std::size_t>(shape.rows * shape.columns) * shape.count;
-  blocks.weights.resize(taps);
-  blocks.left = blocks.right = 0;
-  const std::uint32_t pitch = static_cast<std::uint32_t>(tile_.columns + 1);
-  for (std::size_t k = 0; k < sorted_.size(); ++k) {
-    const std::uint32_t i = sorted_[k];
-    const int right = left_[i] + columns_[i];
-    blocks.left = k == 0 ? left_[i] : std::min(blocks.left, left_[i]);
-    blocks.right = k == 0 ? right : std::max(blocks.right, right);
-    int column = left_[i];
-    if (column < 0) column += job_.width();
-    if (column >= job_.width()) column -= job_.width();
-    blocks.rows.push_back(narrow(top_[i]));
-    blocks.columns.push_back(narrow(column));
-    blocks.target_rows.push_back(narrow(tile_.row + static_cast<int>(i / pitch)));
-    blocks.target_columns.push_back(narrow(tile_.column + static_cast<int>(i % pitch)));
+  for (std::size_t k = 0; k < shapes_.size(); ++k) {
+    const BoxShape shape = unpack(shapes_[k]);
+    taps += static_cast<std::size_t>(shape.rows) * shape.columns * counts_[k];
+    blocks.groups.push_back({shape.face, shape.rows, shape.columns, counts_[k]});
   }
-  const TileImages tile{positions_.from(0), pitch, shares_.data()};
+  blocks.weights.resize(taps);
+  const TileImages tile{positions_.from(0), corner(1, 0), shares_.data()};
   const TexelWeights source = job_.texel_weights();
   float* weights = blocks.weights.data();
   const std::uint32_t* texels = sorted_.data();
-  for (const Shape& shape : shapes_) {
-    const BlockGroup group{shape.face, static_cast<std::uint32_t>(shape.rows),
-                           static_cast<std::uint32_t>(shape.columns), shape.count};
+  for (std::size_t k = 0; k < shapes_.size(); ++k) {
+    const BoxShape shape = unpack(shapes_[k]);
     if (looks_at_centers(job_.filter)) {
-      interpolate_at_centers({texels, shape.count}, weights);
+      interpolate_at_centers({texels, counts_[k]}, weights);
     } else {
-      kernels_.find_weights(tile, boxes_from(0), source, shape.kind, texels, shape.count, group.rows,
-                            group.columns, weights);
+      kernels_.find_weights(tile, boxes_from(0), source, shape, texels, counts_[k], weights);
     }
-    blocks.groups.push_back(group);
-    texels += shape.count;
-    weights += static_cast<std::size_t>(shape.count) * group.rows * group.columns;
+    texels += counts_[k];
+    weights += static_cast<std::size_t>(shape.rows) * shape.columns * counts_[k];
   }
 }
 

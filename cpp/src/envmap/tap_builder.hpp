@@ -67,21 +67,10 @@ class TapBuilder {
   void build(const Tile& tile, TapChunk& chunk);
 
  private:
-  // Of blocks of one kind of texel.
-  struct Shape {
-    std::int32_t face;
-    std::int32_t rows;
-    std::int32_t columns;
-    std::uint8_t kind;
-    std::uint32_t count = 0;
-
-    bool operator==(const Shape& other) const {
-      return face == other.face && rows == other.rows && columns == other.columns && kind == other.kind;
-    }
-  };
   struct Block {
     std::uint32_t texel;
-    std::uint32_t shape;
+    std::uint16_t row;    // of the tile
+    std::uint16_t shape;  // its place in shapes_
   };
 
   // Texels have the number of their corner above left.
@@ -92,17 +81,16 @@ class TapBuilder {
   glm::dvec2 target_corner(int row, int column) const;
   Quad quad(std::size_t texel) const;
   BoxArrays boxes_from(std::size_t texel) {
-    return {left_.data() + texel, top_.data() + texel, columns_.data() + texel, rows_.data() + texel};
+    return {left_.data() + texel, top_.data() + texel, box_shapes_.data() + texel};
   }
 
   bool select_first_texels(const Tile& tile);
   void find_corners();
   void classify();
   void find_centers();
-  bool is_block(std::size_t texel) const;
   void find_blocks(TapChunk& chunk);
-  void sort_blocks();
-  void add_blocks(TapChunk::Blocks& blocks);
+  void sort_blocks(TapChunk::Blocks& blocks);
+  void weigh_blocks(TapChunk::Blocks& blocks);
   void interpolate_at_centers(std::span<const std::uint32_t> texels, float* weights) const;
   void add_list(int row, int column, TapChunk& chunk);
 
@@ -118,10 +106,11 @@ class TapBuilder {
   Positions positions_;              // of corners, or of centres
   std::vector<std::uint8_t> kinds_;
   std::vector<float> shares_;
-  std::vector<std::int32_t> left_, top_, columns_, rows_;
-  std::vector<Shape> shapes_;
-  std::vector<Block> found_;
-  std::vector<std::uint32_t> starts_;  // of shapes
+  std::vector<std::int32_t> left_, top_;
+  std::vector<std::uint32_t> box_shapes_;
+  std::vector<std::uint32_t> shapes_;           // that occur
+  std::vector<std::uint32_t> counts_, starts_;  // of blocks, by shape
+  std::vector<Block> blocks_;
   std::vector<std::uint32_t> sorted_;  // texels, by shape
 };
 

@@ -40,7 +40,7 @@ EnvMap resample(const EnvMapView& source, const Projection& target, int width, i
 class Resampler {
  public:
   /// `source`: the projection and size of the maps to come, of any number of channels. Keeps at most
-  /// `max_bytes`; what does not fit into them is found again every time. 12 bytes for each texel of the source
+  /// `max_bytes`; what does not fit into them is found again every time. 5 bytes for each texel of the source
   /// that a texel of the target reads are typical, divided by the symmetries that both maps share: 16 between
   /// a panorama and a cube, 1 if they are turned against each other. Throws as resample().
   Resampler(const EnvMapLayout& source, const Projection& target, int width, int height,

@@ -123,6 +123,7 @@ std::optional<Quad> IrregularTexels::quad_on_face(const Corners& corners) const 
 
 std::optional<std::span<const Tap>> IrregularTexels::find(int face, glm::dvec2 low, glm::dvec2 high) {
   taps_.clear();
+  polygons_ = 0;
   const Corners around = corners(face, low, high);
   const glm::dvec2 middle = 0.5 * (low + high);
   clipped_ = disc_extent(job_.target.projection.kind, low, high) == DiscExtent::crosses_rim;
@@ -142,7 +143,7 @@ std::optional<std::span<const Tap>> IrregularTexels::find(int face, glm::dvec2 l
     }
     take_part(part);
   }
-  merge(taps_);
+  if (polygons_ > 1) merge(taps_);
   return taps_;
 }
 
@@ -443,12 +444,14 @@ void IrregularTexels::unroll_outline() {
 }
 
 void IrregularTexels::gather_point(const TexelCorner& at, double weight) {
+  ++polygons_;
   if (content_ == Content::constant_texels) return add(texel(at), weight);
   emit_bilinear(job_.source, at.face, at.position.x, at.position.y,
                 [&](const TexelPlace& place, double share) { add(place, weight * share); });
 }
 
 void IrregularTexels::gather_polygon(int face, std::span<const glm::dvec2> corners) {
+  ++polygons_;
   const int width = job_.width();
   const int height = job_.height();
   if (content_ == Content::interpolated) {

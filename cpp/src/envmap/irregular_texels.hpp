@@ -37,7 +37,7 @@ class IrregularTexels {
   /// Most taps that find() returns.
   static constexpr std::size_t kMostTaps = 1 << 16;
 
-  /// The taps of the texel of `face` that spans the given rectangle of the target, each texel once; their
+  /// The taps of the texel of `face` that spans the given rectangle of the target; their
   /// weights add up to 1, or there are none. Nothing if there are too many: such a texel shrinks the source so
   /// much that `automatic` does not interpolate.
   std::optional<std::span<const Tap>> find(int face, glm::dvec2 low, glm::dvec2 high);
@@ -96,6 +96,7 @@ class IrregularTexels {
   Content content_ = Content::constant_texels;
   bool clipped_ = false;
   bool too_many_ = false;
+  int polygons_ = 0;  // that taps come from; different ones may have the same texels
   const std::function<void(std::span<const Tap>)>* consume_ = nullptr;
   std::vector<glm::dvec2> outline_;  // in texels of the source
   std::vector<glm::dvec2> polygon_;  // the same, going on across the seam

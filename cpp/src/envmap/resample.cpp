@@ -61,11 +61,12 @@ void check_texels(const char* name, const EnvMapLayout& layout) {
 // Tiles of the target that have texels to find taps for.
 std::vector<Tile> tiles_of(const ResampleJob& job, std::span<const SharedSymmetry> symmetries) {
   // Tiles that read some 64² texels of the source, as far as these are spread evenly, and wider than high, since
-  // most symmetries take rows to rows.
+  // most symmetries take rows to rows; of small maps small ones, so that every thread gets some.
   constexpr int kAspect = 4;
-  const double ratio = std::sqrt(static_cast<double>(job.source.level_texels(0)) /
-                                 static_cast<double>(job.target.level_texels(0)));
-  const int down = static_cast<int>(std::clamp(32.0 / ratio, 1.0, 12.0));
+  const double texels = static_cast<double>(job.target.level_texels(0));
+  const double ratio = std::sqrt(static_cast<double>(job.source.level_texels(0)) / texels);
+  const double most = std::sqrt(texels / static_cast<double>(symmetries.size()) / 32.0);
+  const int down = static_cast<int>(std::clamp(std::min(32.0 / ratio, most), 1.0, 12.0));
   const int across = kAspect * down;
   std::vector<Tile> tiles;
   for (int face = 0; face < face_count(job.target.projection); ++face) {
@@ -203,11 +204,15 @@ class TapApplication {
 
   void apply(const TapChunk::Lists& lists, const TexelMap& map, const TexelNumbering& targets) {
     if (lists.counts.empty()) return;
-    std::array<TexelNumbering, 6> numbers;
-    for (std::size_t face = 0; face < 6; ++face) numbers[face] = numbering(job_.source, map.faces[face]);
-    taps_.clear();
-    for (const TexelPlace& texel : lists.texels) {
-      taps_.push_back(number(numbers[static_cast<std::size_t>(texel.face)], texel.row, texel.column));
+    if (face_count(job_.projection()) == 1) {
+      number(numbering(job_.source, map.faces[0]), lists.rows, lists.columns, taps_);
+    } else {
+      std::array<TexelNumbering, 6> numbers;
+      for (std::size_t face = 0; face < 6; ++face) numbers[face] = numbering(job_.source, map.faces[face]);
+      taps_.clear();
+      for (std::size_t i = 0; i < lists.faces.size(); ++i) {
+        taps_.push_back(number(numbers[lists.faces[i]], lists.rows[i], lists.columns[i]));
+      }
     }
     number(targets, lists.target_rows, lists.target_columns, targets_);
     apply_taps(lists.counts, lists.weights.data(), targets_.data());

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <glm/common.hpp>
+#include <glm/matrix.hpp>
 #include <glm/vec2.hpp>
 
 namespace mirrorbake {
@@ -110,25 +112,25 @@ std::optional<TexelMap> texel_map(const EnvMapLayout& layout, const glm::dmat3& 
 
 std::vector<SharedSymmetry> shared_symmetries(const EnvMapLayout& source, const EnvMapLayout& target,
                                               const glm::mat3& source_from_target) {
-  const std::vector<glm::dmat3> all = signed_permutations();
   const glm::dmat3 matrix(source_from_target);
+  const glm::dmat3 inverse = glm::transpose(matrix);
   std::vector<SharedSymmetry> shared;
-  const bool target_first = face_count(target.projection) < face_count(source.projection);
-  for (const glm::dmat3& of_target : all) {
-    // Products with signed permutations are exact: a matrix that is symmetric but for rounding is not taken
-    // for symmetric.
-    const glm::dmat3 turned = matrix * of_target;
-    for (const glm::dmat3& of_source : all) {
-      if (of_source * matrix != turned) continue;
-      // The map of fewer faces takes less time to turn down.
-      std::optional<TexelMap> first =
-          target_first ? texel_map(target, of_target) : texel_map(source, of_source);
-      if (!first) continue;
-      std::optional<TexelMap> second =
-          target_first ? texel_map(source, of_source) : texel_map(target, of_target);
-      if (!second) continue;
-      shared.push_back(target_first ? SharedSymmetry{*first, *second} : SharedSymmetry{*second, *first});
+  for (const glm::dmat3& of_target : signed_permutations()) {
+    // The only one that may do the same in the source, and whether it does. Products with signed permutations are
+    // exact: a matrix that is symmetric but for rounding is not taken for symmetric.
+    glm::dmat3 of_source = matrix * of_target * inverse;
+    for (int i = 0; i < 3; ++i) of_source[i] = glm::round(of_source[i]);
+    if (of_source * matrix != matrix * of_target) continue;
+    // The map of fewer faces takes less time to turn down.
+    std::optional<TexelMap> in_target, in_source;
+    if (face_count(target.projection) < face_count(source.projection)) {
+      in_target = texel_map(target, of_target);
+      if (in_target) in_source = texel_map(source, of_source);
+    } else {
+      in_source = texel_map(source, of_source);
+      if (in_source) in_target = texel_map(target, of_target);
     }
+    if (in_target && in_source) shared.push_back({*in_target, *in_source});
   }
   return shared;
 }

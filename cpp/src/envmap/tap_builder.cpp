@@ -60,13 +60,15 @@ std::size_t TapChunk::bytes() const {
   const auto size = [](const auto& vector) { return vector.size() * sizeof(vector[0]); };
   return size(blocks.groups) + size(blocks.target_rows) + size(blocks.target_columns) + size(blocks.rows) +
          size(blocks.columns) + size(blocks.weights) + size(lists.target_rows) + size(lists.target_columns) +
-         size(lists.counts) + size(lists.texels) + size(lists.weights) + size(giants);
+         size(lists.counts) + size(lists.faces) + size(lists.rows) + size(lists.columns) +
+         size(lists.weights) + size(giants);
 }
 
 void TapChunk::clear() {
   const auto empty = [](auto&... vectors) { (vectors.clear(), ...); };
   empty(blocks.groups, blocks.target_rows, blocks.target_columns, blocks.rows, blocks.columns, blocks.weights,
-        lists.target_rows, lists.target_columns, lists.counts, lists.texels, lists.weights, giants);
+        lists.target_rows, lists.target_columns, lists.counts, lists.faces, lists.rows, lists.columns,
+        lists.weights, giants);
 }
 
 bool may_have_first_texels(const Tile& tile, std::span<const SharedSymmetry> symmetries) {
@@ -120,13 +122,17 @@ bool TapBuilder::select_first_texels(const Tile& tile) {
     const Order order = order_of_image(tile, map);
     if (order == Order::before) return false;
     if (order == Order::after) continue;
-    for (int row = 0; row < tile.rows; ++row) {
-      for (int column = 0; column < tile.columns; ++column) {
-        const TexelPlace place{tile.face, tile.row + row, tile.column + column};
-        const TexelPlace image = map(place);
-        if (image.row < place.row || (image.row == place.row && image.column < place.column)) {
-          first_[texel(row, column)] = 0;
-        }
+    const FaceMap& to = map.faces[static_cast<std::size_t>(tile.face)];
+    std::uint8_t* first = first_.data();
+    for (int row = tile.row; row < tile.row + tile.rows; ++row) {
+      const int row_image = to.row_per_row * row + to.row_offset;
+      const int column_image = to.column_per_row * row + to.column_offset;
+      for (int column = tile.column; column < tile.column + tile.columns; ++column, ++first) {
+        const int r = row_image + to.row_per_column * column;
+        int c = column_image + to.column_per_column * column;
+        c += c < 0 ? map.width : 0;
+        c -= c >= map.width ? map.width : 0;
+        *first &= static_cast<std::uint8_t>((r > row) | ((r == row) & (c >= column)));
       }
     }
   }
@@ -332,7 +338,9 @@ void TapBuilder::add_list(int row, int column, TapChunk& chunk) {
   TapChunk::Lists& lists = chunk.lists;
   const std::size_t before = lists.weights.size();
   const auto add = [&](const TexelPlace& texel, double weight) {
-    lists.texels.push_back(texel);
+    lists.faces.push_back(static_cast<std::uint8_t>(texel.face));
+    lists.rows.push_back(narrow(texel.row));
+    lists.columns.push_back(narrow(texel.column));
     lists.weights.push_back(static_cast<float>(weight));
   };
   if (looks_at_centers(job_.filter)) {

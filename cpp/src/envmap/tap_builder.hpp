@@ -38,7 +38,9 @@ struct TapChunk {
     std::vector<std::uint16_t> target_rows;
     std::vector<std::uint16_t> target_columns;
     std::vector<std::uint32_t> counts;
-    std::vector<TexelPlace> texels;
+    std::vector<std::uint8_t> faces;  ///< of taps, and their rows, columns and weights
+    std::vector<std::uint16_t> rows;
+    std::vector<std::uint16_t> columns;
     std::vector<float> weights;
   };
 

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "mirrorbake/envmap/texel_lookup.hpp"
 
@@ -29,20 +31,28 @@ double length_of(const Quad& quad) {
 }  // namespace
 
 StraightLimits straight_limits(const EnvMapLayout& source) {
-  const double length = std::min(0.25 * (source.width + 4), kLongest);
+  // An edge of so many radians may bend by an eightieth of its length, and what it encloses by a tenth of that.
+  constexpr double kSmall = 0.1;
   constexpr double kAny = std::numeric_limits<double>::max();
+  const double length = std::min(0.25 * (source.width + 4), kLongest);
+  // Texels in a radian where they are largest.
+  double density = 0.5 * source.width;
   switch (source.projection.kind) {
     // Around the poles of a panorama images are long and bent along their length: n texels of the target away
     // from one straight edges shift 1/(12 n) of the area.
-    case ProjectionKind::latlong: return {0.1, kAny, length};
-    case ProjectionKind::cube:
-    case ProjectionKind::dual_paraboloid: return {0.01, kAny, length};
+    case ProjectionKind::latlong: return {0.1, kAny, length, kSmall * source.height / std::numbers::pi};
+    case ProjectionKind::cube: return {0.01, kAny, std::min(length, kSmall * density), kAny};
+    case ProjectionKind::dual_paraboloid:
+      density *= 0.5;
+      return {0.01, kAny, std::min(length, kSmall * density), kAny};
     // Along a rim that is a single direction they are slivers, which a small bend empties.
-    case ProjectionKind::sphere_map:
-    case ProjectionKind::angular:
-    case ProjectionKind::fisheye: break;
+    case ProjectionKind::sphere_map: density *= 0.5; break;
+    case ProjectionKind::angular: density /= std::numbers::pi; break;
+    case ProjectionKind::fisheye:
+      density /= 0.5 * glm::radians(static_cast<double>(source.projection.field_of_view));
+      break;
   }
-  return {0.01, 0.2, length};
+  return {0.01, 0.2, std::min(length, kSmall * density), kAny};
 }
 
 bool is_straight(const Quad& quad, const StraightLimits& limits) {
@@ -50,7 +60,7 @@ bool is_straight(const Quad& quad, const StraightLimits& limits) {
   const glm::dvec2 p = quad[2] - quad[0];
   const glm::dvec2 q = quad[3] - quad[1];
   const double longest = length_of(quad);
-  return longest < limits.length &&
+  return longest < limits.length && std::max(std::abs(p.y), std::abs(q.y)) < limits.height &&
          std::abs(bend.x) + std::abs(bend.y) < std::max(kStraightBend, limits.per_length * longest) &&
          std::abs(cross(bend, p)) + std::abs(cross(bend, q)) <= limits.shift * std::abs(cross(p, q));
 }
@@ -354,8 +364,8 @@ double IrregularTexels::unrolled(double x, double near) const {
 void IrregularTexels::trace(int face, const OutlinePoint& from, const OutlinePoint& to, bool along_rim,
                             int depth) {
   constexpr int kDeepestEdge = 20;
-  constexpr double kDeviation = 0.02;           // in texels
-  constexpr double kDeviationPerLength = 0.01;  // of long chords
+  constexpr double kDeviation = 0.02;            // in texels
+  constexpr double kDeviationPerLength = 0.002;  // of long chords
   glm::dvec2 at = 0.5 * (from.at + to.at);
   if (along_rim) at = glm::normalize(at);
   const OutlinePoint middle = outline_point(face, at);

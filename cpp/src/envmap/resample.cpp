@@ -179,8 +179,14 @@ class TapApplication {
     const TexelNumbering numbers = numbering(job_.source, face);
     const std::size_t taps = static_cast<std::size_t>(group.rows) * group.columns;
     const auto crosses = [&](std::uint32_t i) {
-      const int left = blocks.columns[first + i];
-      return crosses_seam(face, left, left + static_cast<int>(group.columns));
+      // Whether the first and the last column are not as far apart as they should be, after a symmetry.
+      const int one = face.column_per_column * blocks.columns[first + i] + face.column_offset;
+      const int other = one + face.column_per_column * (static_cast<int>(group.columns) - 1);
+      const auto turn = [&](int x) {
+        const int width = job_.width();
+        return (x >= -width) + (x >= 0) + (x >= width) + (x >= 2 * width);
+      };
+      return turn(one) != turn(other);
     };
     for (std::uint32_t i = 0; i < group.targets;) {
       BlockGroup part = group;

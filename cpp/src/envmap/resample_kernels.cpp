@@ -131,6 +131,7 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
   const double per_length = limits.per_length;
   const double most_shift = limits.shift;
   const double farthest = limits.length;
+  const double highest = limits.height;
   for (std::size_t i = 0; i < count; ++i) {
     const double bend_x = ax[i] + bx[i + 1] - ax[i + 1] - bx[i];
     const double bend_y = ay[i] + by[i + 1] - ay[i + 1] - by[i];
@@ -153,7 +154,8 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
     const double side = __builtin_sqrt(area + long_share * (wide2 - area));
     const bool straight =
         (magnitude(bend_x) + magnitude(bend_y) < larger(kStraightBend, per_length * longest)) &
-        (shift <= most_shift * cross) & (longest < farthest) & (side > 1e-3);
+        (shift <= most_shift * cross) & (longest < farthest) &
+        (larger(magnitude(py), magnitude(qy)) < highest) & (side > 1e-3);
     // Above 0 from one texel down, 1 from three quarters down, and smooth in between: where it bends, the one
     // filter takes what the other does not give.
     double share = automatic ? 4.0 - 4.0 * side : 0.0;
@@ -182,11 +184,12 @@ inline double least(double a, double b, double c, double d) {
   const double f = c < d ? c : d;
   return e < f ? e : f;
 }
-inline double greatest(double a, double b, double c, double d) { return -least(-a, -b, -c, -d); }
+inline double greatest(double a, double b, double c, double d) { return larger(larger(a, b), larger(c, d)); }
 
+// Of positions, which are above −kFarthest; what is cut off is below 1e-10.
 inline std::int32_t floor_of(double v) {
-  const std::int32_t i = static_cast<std::int32_t>(v);
-  return static_cast<double>(i) > v ? i - 1 : i;
+  constexpr std::int32_t kFarthest = 1 << 18;
+  return static_cast<std::int32_t>(v + kFarthest) - kFarthest;
 }
 
 // Of pixels, or of the corners of cells with texels' centres for corners. Edges that rounding has put a bit
@@ -195,7 +198,13 @@ void find_boxes(const PositionArrays& above, const PositionArrays& below,
                 const std::uint8_t* __restrict kinds, std::size_t count, const FaceSize& face,
                 const BoxArrays& boxes) {
   constexpr double kRounding = 1e-9;
+  constexpr std::size_t kSome = 64;
   constexpr std::int32_t kMost = static_cast<std::int32_t>(kMostBlockTaps);
+  constexpr std::int32_t kAnywhere = 1 << 30;
+  const std::int32_t first_column = face.is_periodic ? -kAnywhere : 0;
+  const std::int32_t last_column = face.is_periodic ? kAnywhere : face.width;
+  const std::int32_t width = face.width;
+  const std::int32_t height = face.height;
   const double* __restrict ax = above.x;
   const double* __restrict ay = above.y;
   const double* __restrict bx = below.x;
@@ -204,28 +213,30 @@ void find_boxes(const PositionArrays& above, const PositionArrays& below,
   std::int32_t* __restrict lefts = boxes.left;
   std::int32_t* __restrict tops = boxes.top;
   std::uint32_t* __restrict shapes = boxes.shapes;
-  const std::int32_t width = face.width;
-  const std::int32_t height = face.height;
-  const bool periodic = face.is_periodic;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::int32_t kind = kinds[i];
-    const double offset = kind & kInterpolate ? 0.5 : 0.0;
-    const std::int32_t more = kind & kInterpolate ? 1 : 0;
-    const double inset = kRounding - offset;
-    const double outset = kRounding + offset;
-    const std::int32_t left = floor_of(least(ax[i], ax[i + 1], bx[i], bx[i + 1]) + inset);
-    const std::int32_t top = floor_of(least(ay[i], ay[i + 1], by[i], by[i + 1]) + inset);
-    const std::int32_t right = floor_of(greatest(ax[i], ax[i + 1], bx[i], bx[i + 1]) - outset) + more;
-    const std::int32_t bottom = floor_of(greatest(ay[i], ay[i + 1], by[i], by[i + 1]) - outset) + more;
-    const std::int32_t columns = (right > left + more ? right : left + more) - left + 1;
-    const std::int32_t rows = (bottom > top + more ? bottom : top + more) - top + 1;
-    const bool beside = (left < 0) | (left + columns > width);
-    const bool fits = (kind != kIrregular) & (top >= 0) & (top + rows <= height) & (columns <= width) &
-                      (columns <= kMost) & (rows <= kMost) & (rows * columns <= kMost) & (periodic | !beside);
-    lefts[i] = left;
-    tops[i] = top;
-    const std::int32_t shape = rows | columns << 10 | faces[i] << 20 | kind << 24;
-    shapes[i] = fits ? static_cast<std::uint32_t>(shape) : 0U;
+  std::int32_t rights[kSome];
+  std::int32_t bottoms[kSome];
+  for (std::size_t begin = 0; begin < count; begin += kSome) {
+    const std::size_t end = count - begin < kSome ? count : begin + kSome;
+    for (std::size_t i = begin; i < end; ++i) {
+      const double offset = 0.5 * (kinds[i] >> 1 & 1);  // of kInterpolate
+      lefts[i] = floor_of(least(ax[i], ax[i + 1], bx[i], bx[i + 1]) + (kRounding - offset));
+      tops[i] = floor_of(least(ay[i], ay[i + 1], by[i], by[i + 1]) + (kRounding - offset));
+      rights[i - begin] = floor_of(greatest(ax[i], ax[i + 1], bx[i], bx[i + 1]) - (kRounding + offset));
+      bottoms[i - begin] = floor_of(greatest(ay[i], ay[i + 1], by[i], by[i + 1]) - (kRounding + offset));
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::int32_t kind = kinds[i];
+      const std::int32_t more = kind >> 1 & 1;
+      const std::int32_t right = rights[i - begin];
+      const std::int32_t bottom = bottoms[i - begin];
+      const std::int32_t columns = (right > lefts[i] ? right - lefts[i] : 0) + more + 1;
+      const std::int32_t rows = (bottom > tops[i] ? bottom - tops[i] : 0) + more + 1;
+      const bool fits = (kind != kIrregular) & (tops[i] >= 0) & (tops[i] + rows <= height) &
+                        (lefts[i] >= first_column) & (lefts[i] + columns <= last_column) &
+                        (columns <= width) & (columns <= kMost) & (rows <= kMost) & (rows * columns <= kMost);
+      const std::int32_t shape = rows | columns << 10 | faces[i] << 20 | kind << 24;
+      shapes[i] = fits ? static_cast<std::uint32_t>(shape) : 0U;
+    }
   }
 }
 

@@ -241,7 +241,6 @@ void TapBuilder::find_blocks(TapChunk& chunk) {
   shapes_.clear();
   counts_.clear();
   blocks_.clear();
-  std::size_t k = 0;
   const std::uint8_t* first = first_.data();
   for (int row = 0; row < tile_.rows; ++row) {
     for (int column = 0; column < tile_.columns; ++column) {
@@ -252,15 +251,19 @@ void TapBuilder::find_blocks(TapChunk& chunk) {
         add_list(row, column, chunk);
         continue;
       }
-      if (k == shapes_.size() || shapes_[k] != shape) {
-        k = static_cast<std::size_t>(std::find(shapes_.begin(), shapes_.end(), shape) - shapes_.begin());
-        if (k == shapes_.size()) {
+      // Shapes by a few of their bits, if no other one has them.
+      std::uint16_t& guess = guesses_[(shape ^ shape >> 7U ^ shape >> 20U) % guesses_.size()];
+      if (guess >= shapes_.size() || shapes_[guess] != shape) {
+        const auto known = std::find(shapes_.begin(), shapes_.end(), shape);
+        guess = narrow(static_cast<int>(known - shapes_.begin()));
+        if (known == shapes_.end()) {
           shapes_.push_back(shape);
           counts_.push_back(0);
         }
       }
+      const std::uint16_t k = guess;
       ++counts_[k];
-      blocks_.push_back({static_cast<std::uint32_t>(i), narrow(row), narrow(static_cast<int>(k))});
+      blocks_.push_back({static_cast<std::uint32_t>(i), narrow(row), k});
     }
   }
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -112,6 +113,7 @@ class TapBuilder {
   std::vector<std::uint32_t> box_shapes_;
   std::vector<std::uint32_t> shapes_;           // that occur
   std::vector<std::uint32_t> counts_, starts_;  // of blocks, by shape
+  std::array<std::uint16_t, 256> guesses_{};    // of places in shapes_
   std::vector<Block> blocks_;
   std::vector<std::uint32_t> sorted_;  // texels, by shape
 };

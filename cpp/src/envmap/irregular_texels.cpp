@@ -21,6 +21,22 @@ double cross(glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; }
 // Parts of larger texels are rasterised one by one.
 constexpr double kLongest = 256.0;
 
+// In texels of the source: of 0.1 rad where texels are largest.
+double longest_part(const EnvMapLayout& source) {
+  double width = 0.5 * source.width;
+  switch (source.projection.kind) {
+    case ProjectionKind::cube: break;
+    case ProjectionKind::dual_paraboloid:
+    case ProjectionKind::sphere_map: width *= 0.5; break;
+    case ProjectionKind::latlong:
+    case ProjectionKind::angular: width /= std::numbers::pi; break;
+    case ProjectionKind::fisheye:
+      width /= 0.5 * glm::radians(static_cast<double>(source.projection.field_of_view));
+      break;
+  }
+  return std::min(0.1 * width, kLongest);
+}
+
 // Along an axis.
 double length_of(const Quad& quad) {
   const glm::dvec2 p = glm::abs(quad[2] - quad[0]);
@@ -30,29 +46,24 @@ double length_of(const Quad& quad) {
 
 }  // namespace
 
-StraightLimits straight_limits(const EnvMapLayout& source) {
-  // An edge of so many radians may bend by an eightieth of its length, and what it encloses by a tenth of that.
-  constexpr double kSmall = 0.1;
+StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& target) {
+  // Of some 0.06 rad: their edges bend by a hundredth of their length.
+  constexpr std::size_t kFewTexels = 3500;
+  const bool few = target.level_texels(0) < kFewTexels;
+  const double length = few ? 0.0 : std::min(0.25 * (source.width + 4), kLongest);
   constexpr double kAny = std::numeric_limits<double>::max();
-  const double length = std::min(0.25 * (source.width + 4), kLongest);
-  // Texels in a radian where they are largest.
-  double density = 0.5 * source.width;
   switch (source.projection.kind) {
     // Around the poles of a panorama images are long and bent along their length: n texels of the target away
     // from one straight edges shift 1/(12 n) of the area.
-    case ProjectionKind::latlong: return {0.1, kAny, length, kSmall * source.height / std::numbers::pi};
-    case ProjectionKind::cube: return {0.01, kAny, std::min(length, kSmall * density), kAny};
-    case ProjectionKind::dual_paraboloid:
-      density *= 0.5;
-      return {0.01, kAny, std::min(length, kSmall * density), kAny};
+    case ProjectionKind::latlong: return {0.1, kAny, length};
+    case ProjectionKind::cube:
+    case ProjectionKind::dual_paraboloid: return {0.01, kAny, length};
     // Along a rim that is a single direction they are slivers, which a small bend empties.
-    case ProjectionKind::sphere_map: density *= 0.5; break;
-    case ProjectionKind::angular: density /= std::numbers::pi; break;
-    case ProjectionKind::fisheye:
-      density /= 0.5 * glm::radians(static_cast<double>(source.projection.field_of_view));
-      break;
+    case ProjectionKind::sphere_map:
+    case ProjectionKind::angular:
+    case ProjectionKind::fisheye: break;
   }
-  return {0.01, 0.2, std::min(length, kSmall * density), kAny};
+  return {0.01, 0.2, length};
 }
 
 bool is_straight(const Quad& quad, const StraightLimits& limits) {
@@ -60,7 +71,7 @@ bool is_straight(const Quad& quad, const StraightLimits& limits) {
   const glm::dvec2 p = quad[2] - quad[0];
   const glm::dvec2 q = quad[3] - quad[1];
   const double longest = length_of(quad);
-  return longest < limits.length && std::max(std::abs(p.y), std::abs(q.y)) < limits.height &&
+  return longest < limits.length &&
          std::abs(bend.x) + std::abs(bend.y) < std::max(kStraightBend, limits.per_length * longest) &&
          std::abs(cross(bend, p)) + std::abs(cross(bend, q)) <= limits.shift * std::abs(cross(p, q));
 }
@@ -78,10 +89,11 @@ double interpolated_share(double side) {
 
 IrregularTexels::IrregularTexels(const ResampleJob& job)
     : job_(job),
-      limits_(straight_limits(job.source)),
+      limits_(straight_limits(job.source, job.target)),
       limits_of_parts_(limits_),
       interpolated_(job.row_weights()) {
   limits_of_parts_.per_length *= 1.5;
+  limits_of_parts_.length = longest_part(job.source);
 }
 
 TexelCorner IrregularTexels::corner(int face, double x, double y) const {
@@ -285,8 +297,9 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
     // The face under consideration comes first, the order around the texel stays.
     while (seen[0].face != faces[f]) std::rotate(seen.begin(), seen.begin() + 1, seen.end());
     const std::optional<Quad> quad = quad_on_face(seen);
-    too_long = too_long || !quad || !(length_of(*quad) < limits_.length);
-    regular = quad && !too_long && is_straight(*quad, depth == 0 ? limits_ : limits_of_parts_);
+    const StraightLimits& limits = depth == 0 ? limits_ : limits_of_parts_;
+    too_long = too_long || !quad || !(length_of(*quad) < limits.length);
+    regular = quad && !too_long && is_straight(*quad, limits);
     if (regular) quads[f] = *quad;
   }
   if (regular) {

@@ -16,7 +16,9 @@
 
 namespace mirrorbake {
 
-StraightLimits straight_limits(const EnvMapLayout& source);
+/// None of a map of few texels is straight enough: that its corners make a parallelogram says nothing of edges that
+/// bend alike.
+StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& target);
 bool is_straight(const Quad& quad, const StraightLimits& limits);
 
 /// Length, in texels of the source, of a texel that covers `area` of them and whose sides' squares add up to

@@ -19,13 +19,11 @@ enum : std::uint8_t { kArea = 1, kInterpolate = 2, kBlend = 3, kIrregular = 4 };
 
 /// When the edges of a texel's image in the source may be taken for straight: b, by which it deviates from a
 /// parallelogram, is below a tenth of a texel or `per_length` of its length, and |b × p| + |b × q| is below
-/// `shift` of |p × q|, p and q the diagonals. Since b says nothing of edges that bend alike, texels also have to
-/// be small.
+/// `shift` of |p × q|, p and q the diagonals.
 struct StraightLimits {
   double per_length = 0.0;
   double shift = 0.0;
   double length = 0.0;  ///< most texels along an axis
-  double height = 0.0;  ///< most texels downwards
 };
 constexpr double kStraightBend = 0.1;
 

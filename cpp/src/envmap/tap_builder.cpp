@@ -82,7 +82,7 @@ TapBuilder::TapBuilder(const ResampleJob& job, const LineTables& lines,
     : job_(job),
       kernels_(resample_kernels()),
       symmetries_(symmetries),
-      limits_(straight_limits(job.source)),
+      limits_(straight_limits(job.source, job.target)),
       lookup_(job, lines),
       irregular_(job) {}
 

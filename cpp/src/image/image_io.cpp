@@ -20,6 +20,7 @@
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
 #include "mirrorbake/image/color.hpp"
+#include "png_check.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -100,6 +101,37 @@ bool jpeg_is_complete(std::span<const unsigned char> bytes) {
   const auto tail = bytes.last(std::min(bytes.size(), kJpegTail));
   return std::search(tail.begin(), tail.end(), kEndOfJpeg.begin(), kEndOfJpeg.end(),
                      [](auto a, char b) { return a == static_cast<unsigned char>(b); }) != tail.end();
+}
+
+// What only looks like a whole file is found before a decoder sees it.
+void check_complete(const std::string& path, FileKind kind) {
+  if (kind == FileKind::jpeg && !jpeg_is_complete(path)) throw FileError(path, "is truncated");
+  if (kind != FileKind::png) return;
+  std::ifstream in(path, std::ios::binary);
+  image_files::check_png(path, [&](std::span<unsigned char> to) {
+    in.read(reinterpret_cast<char*>(to.data()), static_cast<std::streamsize>(to.size()));
+    return static_cast<std::size_t>(in.gcount());
+  });
+}
+
+void check_complete(const std::string& name, FileKind kind, std::span<const unsigned char> bytes) {
+  if (kind == FileKind::jpeg && !jpeg_is_complete(bytes)) throw FileError(name, "is truncated");
+  if (kind != FileKind::png) return;
+  image_files::check_png(name, [&](std::span<unsigned char> to) {
+    const std::size_t count = std::min(to.size(), bytes.size());
+    std::copy_n(bytes.begin(), count, to.begin());
+    bytes = bytes.subspan(count);
+    return count;
+  });
+}
+
+// What OpenImageIO says of a failure, often several lines, in one.
+std::string one_line(std::string text) {
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) text.pop_back();
+  for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at)) {
+    text.replace(at, 1, "; ");
+  }
+  return text;
 }
 
 std::string size_text(std::int64_t width, std::int64_t height, int channels) {
@@ -220,12 +252,13 @@ std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path, FileKind k
                                              const ImageLimits& limits, OIIO::Filesystem::IOProxy* proxy,
                                              OIIO::ImageSpec& spec) {
   std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(plugin_name(kind));
-  if (!input) throw FileError(path, "cannot be read: " + OIIO::geterror());
+  if (!input) throw FileError(path, "cannot be read: " + one_line(OIIO::geterror()));
   if (proxy != nullptr && !input->set_ioproxy(proxy)) throw FileError(path, "cannot be read from memory");
   // Unassociated alpha is multiplied in by us, in linear light, and not by the reader in encoded values.
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
-  if (!input->open(path, spec, config)) throw FileError(path, "cannot be read: " + input->geterror());
+  if (!input->open(path, spec, config))
+    throw FileError(path, "cannot be read: " + one_line(input->geterror()));
   if (spec.deep) throw FileError(path, "holds deep samples, expected flat pixels");
   if (spec.depth > 1) throw FileError(path, "is a volume, expected an image");
   check_limits(path, spec.width, spec.height, spec.nchannels, limits);
@@ -258,7 +291,7 @@ Image read(const std::string& path, FileKind kind, const DecodeOptions& options,
   // The TIFF reader succeeds on a truncated file and only leaves a message.
   if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, image.pixels.data()) ||
       input->has_error()) {
-    throw FileError(path, "is damaged or truncated: " + input->geterror());
+    throw FileError(path, "is damaged or truncated: " + one_line(input->geterror()));
   }
   if (image_files::is_srgb(spec, options.transfer)) decode_srgb(spec, image.pixels);
   if (options.alpha == AlphaUse::multiply && spec.alpha_channel >= 0 &&
@@ -338,6 +371,16 @@ void check_channels(const std::string& path, FileKind kind, std::span<const std:
                             channels.back());
 }
 
+// Rounds a colour to what RGBE holds, three mantissas of 8 bits and the largest one's exponent: the writer cuts off what
+// is beyond, which darkens images by half a percent.
+void round_to_rgbe(std::span<float, 3> color) {
+  int exponent = 0;
+  const float largest = std::max({color[0], color[1], color[2]});
+  const float mantissa = std::frexp(largest, &exponent);
+  if (mantissa >= 255.5F / 256.0F) ++exponent;
+  for (float& v : color) v = std::ldexp(std::nearbyint(std::ldexp(v, 8 - exponent)), exponent - 8);
+}
+
 // Turns `values`, whole pixels, into what `spec` stores.
 void encode(const OIIO::ImageSpec& spec, FileKind kind, std::span<float> values, SaveReport& report) {
   if (spec.format == OIIO::TypeDesc::HALF) {
@@ -357,6 +400,7 @@ void encode(const OIIO::ImageSpec& spec, FileKind kind, std::span<float> values,
         ++report.clipped;
       }
     }
+    for (std::size_t i = 0; i < values.size(); i += 3) round_to_rgbe(values.subspan(i).first<3>());
     return;
   }
   if (!is_integer(spec.format)) return;
@@ -382,7 +426,7 @@ void encode(const OIIO::ImageSpec& spec, FileKind kind, std::span<float> values,
 std::unique_ptr<OIIO::ImageInput> image_files::open_file(const std::string& path, const ImageLimits& limits,
                                                          OIIO::ImageSpec& spec) {
   const FileKind kind = kind_from_content(path);
-  if (kind == FileKind::jpeg && !jpeg_is_complete(path)) throw FileError(path, "is truncated");
+  check_complete(path, kind);
   std::unique_ptr<OIIO::ImageInput> input = open_input(path, kind, limits, nullptr, spec);
   check_expansion(path, kind, spec, std::filesystem::file_size(path));
   return input;
@@ -414,7 +458,7 @@ std::vector<std::string> default_channels(int count) {
 
 Image load_image(const std::string& path, const ImageLimits& limits) {
   const FileKind kind = kind_from_content(path);
-  if (kind == FileKind::jpeg && !jpeg_is_complete(path)) throw FileError(path, "is truncated");
+  check_complete(path, kind);
   return file_errors(path, [&] {
     return read(path, kind, {limits, Transfer::automatic, AlphaUse::multiply});
   });
@@ -435,8 +479,14 @@ ImageSize read_image_size(const std::string& path, const ImageLimits& limits) {
 Image decode_image(const std::string& name, std::span<const unsigned char> bytes,
                    const DecodeOptions& options) {
   const FileKind kind = kind_from_head(name, bytes);
-  if (kind == FileKind::jpeg && !jpeg_is_complete(bytes)) throw FileError(name, "is truncated");
+  check_complete(name, kind, bytes);
   return file_errors(name, [&] { return read(name, kind, options, bytes); });
+}
+
+void check_image_path(const std::string& path, PixelFormat format) {
+  if (path.empty()) throw FileError("''", "an output path may not be empty");
+  storage_type(path, kind_from_extension(path), format);
+  const AtomicFile checks_the_folder(path);
 }
 
 SaveReport save_image(const std::string& path, const Image& image, PixelFormat format) {
@@ -457,6 +507,7 @@ SaveReport save_image(const std::string& path, int width, int height, std::span<
   if (std::set<std::string>(channels.begin(), channels.end()).size() != channels.size()) {
     throw InvalidArgument("image.channels", "a list with a name twice", "different names");
   }
+  check_image_path(path, format);
   const FileKind kind = kind_from_extension(path);
   check_channels(path, kind, channels);
 
@@ -474,11 +525,16 @@ SaveReport save_image(const std::string& path, int width, int height, std::span<
   spec.attribute("Software", "mirrorbake");
 
   AtomicFile file(path);
+  // The proxy outlives its user, which may still write to it when it is closed by an exception.
+  OIIO::Filesystem::IOVecOutput memory;
   const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin_name(kind));
-  if (!output) throw FileError(path, "cannot be written: " + OIIO::geterror());
+  if (!output) throw FileError(path, "cannot be written: " + one_line(OIIO::geterror()));
   output->threads(thread_count());
+  // The PNG writer does not notice a full disk, and the JPEG writer ends the program: these get none to write to.
+  const bool in_memory = kind == FileKind::png || kind == FileKind::jpeg;
+  if (in_memory && !output->set_ioproxy(&memory)) throw FileError(path, "cannot be written to memory");
   if (!output->open(file.temporary(), spec))
-    throw FileError(path, "cannot be written: " + output->geterror());
+    throw FileError(path, "cannot be written: " + one_line(output->geterror()));
   SaveReport report;
   constexpr int kRows = 64;
   std::vector<float> rows;
@@ -488,11 +544,15 @@ SaveReport save_image(const std::string& path, int width, int height, std::span<
     rows.assign(first, first + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(end - y) * row_values));
     encode(spec, kind, rows, report);
     if (!output->write_scanlines(y, end, 0, OIIO::TypeDesc::FLOAT, rows.data())) {
-      throw FileError(path, "cannot be written: " + output->geterror());
+      throw FileError(path, "cannot be written: " + one_line(output->geterror()));
     }
   }
-  if (!output->close()) throw FileError(path, "cannot be written: " + output->geterror());
-  file.commit();
+  if (!output->close()) throw FileError(path, "cannot be written: " + one_line(output->geterror()));
+  if (in_memory) {
+    write_file(path, std::as_bytes(std::span(memory.buffer())));
+  } else {
+    file.commit();
+  }
   return report;
 }
 

@@ -65,9 +65,13 @@ struct DecodeOptions {
 Image decode_image(const std::string& name, std::span<const unsigned char> bytes,
                    const DecodeOptions& options = {});
 
+/// What save_image would refuse whatever the image is: throws FileError if the extension of `path` names no format or one
+/// that cannot store `format`, if `path` is empty or a folder, or its folder does not exist. Nothing is written.
+void check_image_path(const std::string& path, PixelFormat format = PixelFormat::automatic);
+
 /// Writes atomically: a temporary file beside `path`, renamed when it is complete. The extension decides the
 /// format. EXR and TIFF hold any channels; PNG one to four, of which an even number must end with "A"; JPEG
-/// one or three; HDR three. Integer formats are encoded to sRGB after clipping to [0,1], alpha unassociated.
+/// one or three; HDR three, rounded to the nearest that its 8 bits hold. Integer formats are encoded to sRGB after clipping to [0,1], alpha unassociated.
 /// Throws FileError if the file cannot be written or its kind cannot hold the image, InvalidArgument if the
 /// image is empty or its parts disagree.
 SaveReport save_image(const std::string& path, const Image& image,

@@ -15,9 +15,12 @@ std::string text(glm::vec3 v) {
   return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
 }
 
-void check_finite(const char* name, glm::vec3 v) {
-  if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z)) {
-    throw InvalidArgument(std::string("camera.") + name, text(v), "finite coordinates");
+// As far out as a scene may reach: Embree aborts on rays that start beyond 1.844e18.
+void check_coordinates(const char* name, glm::vec3 v) {
+  constexpr float kMaxCoordinate = 1e12F;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(v[axis]) <= kMaxCoordinate) continue;
+    throw InvalidArgument(std::string("camera.") + name, text(v), "finite coordinates up to 1e12");
   }
 }
 
@@ -34,9 +37,9 @@ void validate(const Camera& camera) {
     throw InvalidArgument("camera.vertical_fov_degrees", std::to_string(fov),
                           "more than 0 and less than 180");
   }
-  check_finite("eye", camera.eye);
-  check_finite("target", camera.target);
-  check_finite("up", camera.up);
+  check_coordinates("eye", camera.eye);
+  check_coordinates("target", camera.target);
+  check_coordinates("up", camera.up);
   const glm::dvec3 view = glm::dvec3(camera.target) - glm::dvec3(camera.eye);
   const double distance = glm::length(view);
   if (!(distance > 0.0))

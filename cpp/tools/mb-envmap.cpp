@@ -6,7 +6,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <iostream>
 #include <limits>
 #include <numbers>
@@ -20,6 +19,7 @@
 #include "mirrorbake/envmap/compare.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
+#include "mirrorbake/envmap/ktx2.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/envmap/sampling.hpp"
@@ -42,16 +42,16 @@ struct Input {
                    "EXR, HDR, TIFF, PNG, JPEG or KTX2; {} in the name stands for px, nx, py, ny, pz, nz")
         ->required();
   }
-  void add_details(CLI::App& app) {
-    app.add_option(
-        "--from", projection,
-        "projection of the input: cube, latlong, dual_paraboloid, sphere_map, angular, fisheye:DEGREES "
-        "(default: by the shape of the image)");
+  void add_details(CLI::App& app, const std::string& whose = "the input") {
+    app.add_option("--from", projection,
+                   "projection of " + whose +
+                       ": cube, latlong, dual_paraboloid, sphere_map, angular, fisheye:DEGREES "
+                       "(default: by the shape of the image)");
     app.add_option("--from-layout", layout,
                    "how faces share the image: strip, column, grid, cross, vertical_cross")
         ->capture_default_str();
     app.add_option("--from-convention", convention,
-                   "orientation of the input: mirrorbake, openexr, oiio, mitsuba, threejs, ktx2")
+                   "orientation of " + whose + ": mirrorbake, openexr, oiio, mitsuba, threejs, ktx2")
         ->capture_default_str();
   }
   EnvMap load() const {
@@ -76,13 +76,13 @@ struct Output {
     app.add_option("--format", format, "pixels in the file: automatic, half, float32, uint8, uint16")
         ->capture_default_str();
   }
+  // Before the work.
+  void check(const Projection& projection) const {
+    check_envmap_path(path, projection, parse_face_layout(layout), parse_pixel_format(format));
+  }
   void save(const EnvMapView& map, bool json) const {
     const SaveReport report = save_envmap(path, map, parse_face_layout(layout), parse_pixel_format(format));
-    if (report.clamped_to_half + report.clipped > 0) {
-      std::cerr << "mb-envmap: warning: " << path << ": " << report.clamped_to_half
-                << " values beyond 65504 clamped to float16, " << report.clipped
-                << " outside of the format clipped\n";
-    }
+    warn_of_losses("mb-envmap", path, report);
     if (!json) return;
     std::cout << "{\"output\": " << json_string(path)
               << ", \"projection\": " << json_string(to_string(map.layout.projection))
@@ -166,8 +166,9 @@ struct Convert {
   float turn = 0.0F;
 
   void run(bool json) const {
-    const EnvMap source = input.load();
     const Projection target = parse_projection(projection);
+    output.check(target);
+    const EnvMap source = input.load();
     // About as many texels as the source has.
     const double texels = static_cast<double>(source.layout.level_texels(0)) / face_count(target);
     const int natural =
@@ -204,41 +205,59 @@ void print_comparison(const Comparison& c, bool json) {
 }
 
 // Levels as KTX2, or as one image per level: {} in the path is the level's number then.
-void write_mips(const EnvMap& mips, const Output& output, bool json) {
-  if (std::filesystem::path(output.path).extension() == ".ktx2") {
-    output.save(mips, json);
+void write_mips(const EnvMap& map, MipFilter filter, const Output& output, bool json) {
+  const std::size_t mark = output.path.find("{}");
+  const bool one_file = mark == std::string::npos && is_ktx2(output.path);
+  if (one_file) {
+    output.check(map.layout.projection);
+    output.save(build_mips(map, filter), json);
     return;
   }
-  const std::size_t mark = output.path.find("{}");
-  if (mark == std::string::npos) {
+  if (mark == std::string::npos || is_ktx2(output.path)) {
     throw InvalidArgument("--output", output.path,
                           "a .ktx2 file, or an image path with {} for the number of the level");
   }
+  const auto numbered = [&](int level) {
+    Output one = output;
+    one.path.replace(mark, 2, std::to_string(level));
+    return one;
+  };
+  numbered(0).check(map.layout.projection);
+  const EnvMap mips = build_mips(map, filter);
   for (int level = 0; level < mips.layout.levels; ++level) {
     EnvMapLayout layout = mips.layout;
     layout.width = mips.layout.level_width(level);
     layout.height = mips.layout.level_height(level);
     layout.levels = 1;
-    Output one = output;
-    one.path.replace(mark, 2, std::to_string(level));
-    one.save(EnvMapView{layout, EnvMapView(mips).level(level), mips.channels}, json);
+    numbered(level).save(EnvMapView{layout, EnvMapView(mips).level(level), mips.channels}, json);
   }
 }
 
-void write_border(const EnvMap& map, int border, const Output& output) {
+// The widened faces are no environment map any more; they are packed like one, by default one below the other.
+void write_border(const EnvMap& map, int border, Output output, bool json) {
+  if (is_ktx2(output.path)) {
+    throw InvalidArgument("--output", output.path, "an image: faces with borders make no cube map");
+  }
+  if (output.layout == "automatic" && output.path.find("{}") == std::string::npos) output.layout = "column";
+  output.check(map.layout.projection);
   const std::vector<float> wide = add_border(map, 0, border);
-  // The widened faces are no environment map any more; they are packed like one, one below the other.
-  std::vector<std::string> names = map.channels;
-  if (names.empty()) names = default_channels(map.layout.channels);
-  const int width = map.layout.width + 2 * border;
-  const int height = (map.layout.height + 2 * border) * face_count(map.layout.projection);
-  save_image(output.path, width, height, names, wide, parse_pixel_format(output.format));
+  EnvMapLayout layout = map.layout;
+  layout.width += 2 * border;
+  layout.height += 2 * border;
+  layout.levels = 1;
+  output.save(EnvMapView{layout, wide, map.channels}, json);
 }
 
 void print_samples(const EnvMap& map, const std::vector<std::vector<float>>& directions,
                    const std::string& filter, bool json) {
   std::vector<glm::vec3> d;
-  for (const std::vector<float>& v : directions) d.emplace_back(v[0], v[1], v[2]);
+  for (const std::vector<float>& v : directions) {
+    if (v.size() != 3) {
+      throw InvalidArgument("--direction", json_list(v),
+                            "three numbers; repeat the option for more directions");
+    }
+    d.emplace_back(v[0], v[1], v[2]);
+  }
   const std::vector<glm::vec3> none(d.size(), glm::vec3(0.0F));
   const std::size_t channels = static_cast<std::size_t>(map.layout.channels);
   std::vector<float> values(d.size() * channels);
@@ -256,6 +275,24 @@ void print_samples(const EnvMap& map, const std::vector<std::vector<float>>& dir
       std::cout << '\n';
     }
   }
+}
+
+std::string describe(const std::string& path, const EnvMapLayout& layout) {
+  return path + " (" + to_string(layout.projection) + ", " + std::to_string(layout.width) + " x " +
+         std::to_string(layout.height) + ", " + std::to_string(layout.channels) + " channels)";
+}
+
+void compare_files(const Input& first, const Input& second, bool json) {
+  const EnvMap map = first.load();
+  const EnvMap reference = second.load();
+  const EnvMapLayout& a = map.layout;
+  const EnvMapLayout& b = reference.layout;
+  if (a.projection != b.projection || a.width != b.width || a.height != b.height ||
+      a.channels != b.channels) {
+    throw InvalidArgument("input", describe(first.path, a),
+                          "projection, size and channels of " + describe(second.path, b));
+  }
+  print_comparison(compare(map, reference), json);
 }
 
 int run(int argc, char** argv) {
@@ -307,8 +344,8 @@ int run(int argc, char** argv) {
   Input border_input;
   Output border_output;
   int border = 1;
-  CLI::App* border_command =
-      app.add_subcommand("border", "Faces widened by texels of their neighbours, one below the other");
+  CLI::App* border_command = app.add_subcommand(
+      "border", "Faces widened by texels of their neighbours, one below the other or as --layout says");
   border_input.add_options(*border_command);
   border_input.add_details(*border_command);
   border_output.add_options(*border_command);
@@ -332,7 +369,7 @@ int run(int argc, char** argv) {
   CLI::App* compare_command = app.add_subcommand("compare", "Errors of a map against a reference");
   first.add_options(*compare_command, "input");
   second.add_options(*compare_command, "reference");
-  first.add_details(*compare_command);
+  first.add_details(*compare_command, "both maps");
 
   try {
     app.parse(argc, argv);
@@ -342,15 +379,14 @@ int run(int argc, char** argv) {
   const ThreadLimit limit(threads);
   if (*info_command) print_info(info, json);
   if (*convert_command) convert.run(json);
-  if (*mips_command)
-    write_mips(build_mips(mips_input.load(), parse_mip_filter(mip_filter)), mips_output, json);
-  if (*border_command) write_border(border_input.load(), border, border_output);
+  if (*mips_command) write_mips(mips_input.load(), parse_mip_filter(mip_filter), mips_output, json);
+  if (*border_command) write_border(border_input.load(), border, border_output, json);
   if (*sample_command) print_samples(sample_input.load(), directions, sample_filter, json);
   if (*compare_command) {
     second.projection = first.projection;
     second.layout = first.layout;
     second.convention = first.convention;
-    print_comparison(compare(first.load(), second.load()), json);
+    compare_files(first, second, json);
   }
   return 0;
 }

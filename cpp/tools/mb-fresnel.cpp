@@ -225,10 +225,13 @@ void report(const Options& options) {
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app("Fresnel curves, tables and the report of what each approximation costs.");
-  app.set_version_flag("--version", MIRRORBAKE_VERSION);
-  app.add_option("--threads", options.threads, "Threads, 0 for all cores")->check(CLI::Range(0, 1024));
+  CLI::App app("Fresnel curves, tables and the report of what each approximation costs.", "mb-fresnel");
+  app.set_version_flag("--version", "mb-fresnel " MIRRORBAKE_VERSION);
+  app.add_option("--threads", options.threads, "Threads, 0 for all cores")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
   app.require_subcommand(1);
+  app.fallthrough();
 
   CLI::App* table =
       app.add_subcommand("table", "A curve at equal steps of the cosine: CSV to stdout, or an image");
@@ -250,7 +253,7 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   table->add_option("--max-error", options.max_error, "Largest error of linear interpolation")
       ->capture_default_str();
-  table->add_option("--out", options.out, "Image of size × 1 pixels, float32 (.exr, .tif) instead of CSV");
+  table->add_option("-o,--out", options.out, "Image of size × 1 pixels, float32 (.exr, .tif) instead of CSV");
   table->callback([&] { write_table(options); });
 
   CLI::App* metal =

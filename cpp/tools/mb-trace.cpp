@@ -113,6 +113,22 @@ EnvironmentLight white_sky() {
   return sky;
 }
 
+// Panoramas that were scaled down with a sharpening filter undershoot beside their lights.
+Image load_panorama(const std::string& path) {
+  Image panorama = load_image(path);
+  std::size_t negative = 0;
+  for (float& value : panorama.pixels) {
+    if (!std::isfinite(value)) throw FileError(path, "has values that are not finite, expected radiance");
+    if (value >= 0.0F) continue;
+    value = 0.0F;
+    ++negative;
+  }
+  if (negative > 0) {
+    std::cerr << "mb-trace: warning: " << path << ": " << negative << " negative values were taken as 0\n";
+  }
+  return panorama;
+}
+
 // What every command takes.
 struct Request {
   std::string path;
@@ -134,9 +150,10 @@ struct Request {
     app.add_option("-o,--output", output, "image to write, .exr for its channels")->required();
     app.add_option("--size", size, "pixels, WIDTHxHEIGHT")->capture_default_str();
     app.add_option("--crop", crop, "the part of the image to trace, WIDTHxHEIGHT+X+Y in pixels");
-    app.add_option("--spp", samples, "samples per pixel, 1 to 65536")->capture_default_str();
-    app.add_option("--depth", depth, "bounces after the first, specular and diffuse, 0 to 64")
-        ->capture_default_str();
+    app.add_option("--spp", samples, "samples per pixel")->capture_default_str()->check(CLI::Range(1, 65536));
+    app.add_option("--depth", depth, "bounces after the first, specular and diffuse")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 64));
     app.add_option("--seed", seed, "of the random numbers")->capture_default_str();
     app.add_option("--indirect", indirect,
                    "diffuse light by way of other surfaces: path (unbiased), cached (smooth) or none")
@@ -188,8 +205,8 @@ struct Request {
     options.seed = seed;
     if (!crop.empty()) {
       const auto numbers = parse_numbers(crop, "x+");
-      if (!numbers || numbers->size() != 4) {
-        throw InvalidArgument("--crop", crop, "WIDTHxHEIGHT+X+Y in pixels");
+      if (!numbers || numbers->size() != 4 || (*numbers)[0] < 1 || (*numbers)[1] < 1) {
+        throw InvalidArgument("--crop", crop, "WIDTHxHEIGHT+X+Y in pixels, one at least");
       }
       options.window = {(*numbers)[2], (*numbers)[3], (*numbers)[0], (*numbers)[1]};
     }
@@ -216,20 +233,14 @@ struct Request {
 
   void save(const Image& image) const { warn(save_image(output, image, parse_pixel_format(format))); }
 
-  void warn(const SaveReport& report) const {
-    if (report.clamped_to_half + report.clipped > 0) {
-      std::cerr << "mb-trace: warning: " << output << ": " << report.clamped_to_half
-                << " values beyond 65504 clamped to float16, " << report.clipped
-                << " outside of the format clipped\n";
-    }
-  }
+  void warn(const SaveReport& report) const { warn_of_losses("mb-trace", output, report); }
 };
 
 Source Request::load() const {
   Source source = load_source();
   if (!sky.empty()) {
     source.scene.environment.emplace();
-    source.scene.environment->panorama = load_image(sky);
+    source.scene.environment->panorama = load_panorama(sky);
   } else if (is_dark(source.scene)) {
     std::cerr << "mb-trace: warning: " << path << ": no lights; a white sky of radiance 1 is added\n";
     source.scene.environment = white_sky();
@@ -292,10 +303,11 @@ struct Beauty {
 
   void run(bool json) const {
     const Stopwatch watch;
+    check_image_path(request.output, parse_pixel_format(request.format));
+    const TraceOptions options = request.trace_options();
     Source source = request.load();
     const Camera camera = request.camera(source);
     const Tracer tracer = request.tracer(std::move(source));
-    const TraceOptions options = request.trace_options();
     BeautyTrace trace;
     if (noise) {
       trace = tracer.trace_beauty_to_noise(camera, *noise, options);
@@ -369,11 +381,12 @@ struct Layers {
 
   void run(bool json) const {
     const Stopwatch watch;
+    check_image_path(request.output, parse_pixel_format(request.format));
+    const TraceOptions options = request.trace_options();
     Source source = request.load();
     const Camera camera = request.camera(source);
     std::vector<int> numbers = objects(source.scene);
     const Tracer tracer = request.tracer(std::move(source));
-    const TraceOptions options = request.trace_options();
     std::vector<LayerTrace> traces = tracer.trace_layers(camera, numbers, options);
     if (reflectors.empty()) drop_unseen(traces, numbers);
 
@@ -470,12 +483,14 @@ struct Capture {
     const Stopwatch watch;
     const EnvMapLayout map = map_layout();
     const FaceLayout face_layout = parse_face_layout(layout);
+    const PixelFormat format = parse_pixel_format(request.format);
+    check_envmap_path(request.output, map.projection, face_layout, format);
     const Tracer tracer = request.tracer(request.load());
     const glm::vec3 from = origin.empty() ? glm::vec3(0.0F) : glm::vec3(origin[0], origin[1], origin[2]);
     const Image image = tracer.capture(from, map.projection, map.width, map.height,
                                        hidden_objects(tracer.scene()), request.trace_options());
-    const SaveReport report = save_envmap(request.output, EnvMapView{map, image.pixels, image.channels},
-                                          face_layout, parse_pixel_format(request.format));
+    const SaveReport report =
+        save_envmap(request.output, EnvMapView{map, image.pixels, image.channels}, face_layout, format);
     request.warn(report);
     if (!json) return;
     std::cout << "{\"output\": " << json_string(request.output)

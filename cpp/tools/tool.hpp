@@ -4,11 +4,14 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <iostream>
+#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/image/image_io.hpp"
 
 /// What the programs have in common: values as JSON, and the exit status.
 namespace mirrorbake::tool {
@@ -43,15 +46,33 @@ std::string json_list(const std::vector<T>& values) {
   return result + "]";
 }
 
+/// Says on stderr what a file could not hold.
+inline void warn_of_losses(const char* program, const std::string& path, const SaveReport& report) {
+  if (report.clamped_to_half > 0) {
+    std::cerr << program << ": warning: " << path << ": " << report.clamped_to_half
+              << " values beyond 65504 clamped to float16\n";
+  }
+  if (report.clipped > 0) {
+    std::cerr << program << ": warning: " << path << ": " << report.clipped
+              << " values outside of what the format holds clipped\n";
+  }
+}
+
 /// The program's exit status: what `run` returns (0 done, 2 usage), 3 for input that cannot be read or makes no sense,
-/// 4 for a computation without an answer, both with a message on stderr.
+/// or output that cannot be written, 4 for a computation without an answer, both with a message on stderr.
 template <typename Run>
 int exit_status(const char* program, const Run& run) {
   try {
-    return run();
+    const int status = run();
+    std::cout.flush();
+    if (!std::cout || std::fflush(stdout) != 0) throw FileError("standard output", "cannot be written");
+    return status;
   } catch (const NumericalError& error) {
     std::fprintf(stderr, "%s: %s\n", program, error.what());
     return 4;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "%s: there is not enough memory for this\n", program);
+    return 3;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: %s\n", program, error.what());
     return 3;

@@ -189,3 +189,69 @@ def test_an_independent_reader_finds_every_level_of_a_ktx2(tmp_path: Path) -> No
         texels = np.frombuffer(base64.b64decode(text), np.float16).reshape(*mips.level(index).shape[:3], 4)
         np.testing.assert_array_equal(texels[..., :3], mips.level(index).astype(np.float16))
         assert np.all(texels[..., 3] == 1)
+
+
+def test_a_ktx2_of_three_channels_compares_with_the_map_it_was_made_from(tmp_path: Path) -> None:
+    values = np.random.default_rng(3).random((6, 8, 8, 3), np.float32)
+    EnvMap.from_array(values, "cube").save(tmp_path / "a.exr", format="float32")
+    mb_envmap("convert", tmp_path / "a.exr", "--to", "cube", "-o", tmp_path / "a.ktx2", "--format", "float32")
+    assert (
+        json.loads(mb_envmap("compare", tmp_path / "a.ktx2", tmp_path / "a.exr", "--json"))["max_error"] == 0
+    )
+    for wish in (["--layout", "cross"], ["--format", "uint8"]):
+        mb_envmap("convert", tmp_path / "a.exr", "--to", "cube", "-o", tmp_path / "b.ktx2", *wish, status=3)
+    assert not (tmp_path / "b.ktx2").exists()
+
+
+def test_maps_that_cannot_be_compared_are_named(panorama: Path, tmp_path: Path) -> None:
+    small = tmp_path / "small.exr"
+    mb_envmap("convert", panorama, "--to", "latlong", "--size", 8, "-o", small)
+    message = mb_envmap("compare", small, panorama, status=3)
+    assert f"{small} (latlong, 16 x 8, 3 channels)" in message
+    assert f"{panorama} (latlong, 64 x 32, 3 channels)" in message
+
+
+def test_borders_go_into_any_layout_and_are_reported(tmp_path: Path) -> None:
+    values = np.random.default_rng(4).random((6, 8, 8, 3), np.float32)
+    cube = EnvMap.from_array(values, "cube")
+    cube.save(tmp_path / "a.exr", format="float32")
+    wide = cube.with_border(2)
+    report = json.loads(
+        mb_envmap(
+            "border",
+            tmp_path / "a.exr",
+            "--width",
+            2,
+            "-o",
+            tmp_path / "w_{}.exr",
+            "--format",
+            "float32",
+            "--json",
+        )
+    )
+    assert (report["width"], report["height"]) == (12, 12)
+    faces = EnvMap.load(tmp_path / "w_{}.exr").values
+    np.testing.assert_array_equal(faces.reshape(wide.shape), wide)
+    assert "--output" in mb_envmap("border", tmp_path / "a.exr", "-o", tmp_path / "w.ktx2", status=3)
+
+
+def test_directions_are_three_numbers_each(panorama: Path) -> None:
+    assert "--direction" in mb_envmap("sample", panorama, "--direction", 0, 0, 1, 1, 0, 0, status=3)
+
+
+def test_output_that_nobody_can_read_is_an_error(panorama: Path) -> None:
+    program = find_program("mb-envmap")
+    assert program is not None
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [program, "info", str(panorama)], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert run.returncode == 3
+    assert "standard output" in run.stderr
+
+
+def test_outputs_are_checked_before_the_input_is_read(tmp_path: Path) -> None:
+    nothing = tmp_path / "none.exr"
+    message = mb_envmap("convert", nothing, "--to", "cube", "-o", tmp_path / "a.doc", status=3)
+    assert "a.doc" in message
+    assert "none.exr" not in message

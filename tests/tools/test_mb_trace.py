@@ -1,6 +1,7 @@
 """mb-trace from the outside: what it writes, what it prints, how it fails."""
 
 import json
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from mirrorbake import _core
-from programs import needs_program, run_program
+from programs import find_program, needs_program, run_program
 
 pytestmark = needs_program("mb-trace")
 
@@ -141,7 +142,7 @@ def test_the_built_in_room_has_reflectors_to_choose_from(tmp_path: Path) -> None
         (["beauty", "SCENE", "-o", "OUT", "--size", "0x4"], 3, "camera.width"),
         (["beauty", "SCENE", "-o", "OUT", "--size", "wide"], 3, "--size"),
         (["beauty", "SCENE", "-o", "OUT", "--crop", "600x4+0+0"], 3, "window"),
-        (["beauty", "SCENE", "-o", "OUT", "--spp", "0"], 3, "samples_per_pixel"),
+        (["beauty", "SCENE", "-o", "OUT", "--spp", "0"], 2, "--spp"),
         (["beauty", "SCENE", "-o", "OUT", "--noise", "2"], 3, "noise"),
         (["beauty", "SCENE", "-o", "OUT", "--noise", "0"], 3, "noise"),
         (["beauty", "SCENE", "-o", "OUT", "--noise", "nan"], 3, "noise"),
@@ -159,3 +160,39 @@ def test_unusable_arguments_end_with_their_status_and_no_file(
     given = [{"SCENE": str(scene), "OUT": str(out)}.get(a, a) for a in arguments]
     assert message in mb_trace(*given, status=status)
     assert not out.exists()
+
+
+def test_panoramas_that_undershoot_are_taken_as_black_and_said_so(scene: Path, tmp_path: Path) -> None:
+    values = np.ones((8, 16, 3), np.float32)
+    values[0, :4] = -0.25
+    sky = tmp_path / "sky.exr"
+    _core.save_image(str(sky), values, ["R", "G", "B"], "float32")
+    out = tmp_path / "a.exr"
+    program = find_program("mb-trace")
+    assert program is not None
+    arguments = ["beauty", scene, "-o", out, *VIEW, "--spp", 1, "--sky", sky]
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=True)
+    assert f"{sky}: 12 negative values" in done.stderr
+    assert out.exists()
+    values[0, 0, 0] = np.nan
+    _core.save_image(str(sky), values, ["R", "G", "B"], "float32")
+    assert "sky.exr" in mb_trace("beauty", scene, "-o", out, *VIEW, "--sky", sky, status=3)
+
+
+def test_outputs_are_checked_before_tracing(tmp_path: Path) -> None:
+    nothing = tmp_path / "none.obj"
+    for command in ("beauty", "layers", "capture"):
+        for wish in (["-o", tmp_path / "a.doc"], ["-o", tmp_path / "a.exr", "--format", "uint8"]):
+            message = mb_trace(command, nothing, *wish, status=3)
+            assert "a." in message
+            assert "none.obj" not in message
+    assert "files" in mb_trace("capture", nothing, "-o", tmp_path / "a_{}.exr", "--layout", "cross", status=3)
+
+
+def test_numbers_out_of_range_are_wrong_usage(scene: Path, tmp_path: Path) -> None:
+    for option, value in (("--spp", 0), ("--spp", 65537), ("--depth", -1), ("--depth", 65)):
+        assert option in mb_trace("beauty", scene, "-o", tmp_path / "a.exr", option, value, status=2)
+    assert "--crop" in mb_trace("beauty", scene, "-o", tmp_path / "a.exr", "--crop", "0x0+0+0", status=3)
+    far = ["--eye", 1e30, 0, 0]
+    assert "camera.eye" in mb_trace("beauty", scene, "-o", tmp_path / "a.exr", *far, status=3)
+    assert not (tmp_path / "a.exr").exists()

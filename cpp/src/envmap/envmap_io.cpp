@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
@@ -90,7 +89,7 @@ std::string face_path(const std::string& path, const Projection& projection, int
                         projection.kind == ProjectionKind::cube ? kCube[index] : kParaboloid[index]);
 }
 
-bool is_ktx2(const std::string& path) { return std::filesystem::path(path).extension() == ".ktx2"; }
+bool names_faces(const std::string& path) { return path.find("{}") != std::string::npos; }
 
 EnvMap load_faces(const std::string& path, const Projection& projection, const ImageLimits& limits) {
   if (face_count(projection) == 1)
@@ -199,7 +198,7 @@ EnvMap unpack_faces(const Image& image, const std::optional<Projection>& project
 EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection, FaceLayout layout,
                    const ImageLimits& limits) {
   if (is_ktx2(path)) return load_ktx2(path, limits);
-  if (path.find("{}") != std::string::npos) {
+  if (names_faces(path)) {
     return load_faces(path, projection.value_or(Projection{ProjectionKind::cube}), limits);
   }
   const Image image = load_image(path, limits);
@@ -210,17 +209,36 @@ EnvMap load_envmap(const std::string& path, const std::optional<Projection>& pro
   }
 }
 
+void check_envmap_path(const std::string& path, const Projection& projection, FaceLayout layout,
+                       PixelFormat format) {
+  const int faces = face_count(projection);
+  if (is_ktx2(path)) {
+    check_ktx2_path(path, projection, format);
+    if (layout != FaceLayout::automatic) {
+      throw InvalidArgument("layout", to_string(layout), "automatic: a KTX2 file has a layout of its own");
+    }
+    return;
+  }
+  const bool several = names_faces(path);
+  check_image_path(several && faces > 1 ? face_path(path, projection, 0) : path, format);
+  if (several && faces == 1) throw InvalidArgument("path", path, "no {}: the map has one face");
+  if (several && layout != FaceLayout::automatic && layout != FaceLayout::files) {
+    throw InvalidArgument("layout", to_string(layout), "files, as " + path + " names one image per face");
+  }
+  if (several) return;
+  if (layout == FaceLayout::files) throw InvalidArgument("path", path, "a path with {} for the face");
+  if (!arrangement(layout, faces)) {
+    throw InvalidArgument("layout", to_string(layout), "strip or column for " + to_string(projection));
+  }
+}
+
 SaveReport save_envmap(const std::string& path, const EnvMapView& map, FaceLayout layout,
                        PixelFormat format) {
-  if (is_ktx2(path)) return save_ktx2(path, map);
-  const bool several = path.find("{}") != std::string::npos;
-  if (!several && layout != FaceLayout::files) return save_image(path, pack_faces(map, 0, layout), format);
-  const Projection& projection = map.layout.projection;
-  if (!several || face_count(projection) == 1) {
-    throw InvalidArgument("path", path,
-                          several ? "no {}: the map has one face" : "a path with {} for the face");
-  }
   validate(map);
+  const Projection& projection = map.layout.projection;
+  check_envmap_path(path, projection, layout, format);
+  if (is_ktx2(path)) return save_ktx2(path, map, format);
+  if (!names_faces(path)) return save_image(path, pack_faces(map, 0, layout), format);
   std::vector<std::string> names(map.channels.begin(), map.channels.end());
   if (names.empty()) names = default_channels(map.layout.channels);
   SaveReport total;

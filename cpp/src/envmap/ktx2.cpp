@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -67,18 +68,18 @@ class ByteWriter {
 };
 
 // Basic descriptor block of the Khronos Data Format Specification 1.3: linear BT.709 RGBA, signed floats.
-void put_data_format(ByteWriter& out, int channels) {
+void put_data_format(ByteWriter& out, int channels, std::size_t bytes) {
   const std::uint32_t block = 24u + 16u * static_cast<std::uint32_t>(channels);
   out.put<std::uint32_t>(block + 4u);
   out.put<std::uint32_t>(0);  // vendor Khronos, basic type
   out.put<std::uint16_t>(2);  // version 1.3
   out.put<std::uint16_t>(static_cast<std::uint16_t>(block));
-  out.put<std::uint32_t>(0x00010101);                                // RGBSDA, BT.709, linear, straight alpha
-  out.put<std::uint32_t>(0);                                         // blocks of one texel
-  out.put<std::uint64_t>(static_cast<std::uint64_t>(2 * channels));  // bytes of plane 0
+  out.put<std::uint32_t>(0x00010101);  // RGBSDA, BT.709, linear, straight alpha
+  out.put<std::uint32_t>(0);           // blocks of one texel
+  out.put<std::uint64_t>(static_cast<std::uint64_t>(channels) * bytes);  // of plane 0
   for (int c = 0; c < channels; ++c) {
-    out.put<std::uint16_t>(static_cast<std::uint16_t>(16 * c));
-    out.put<std::uint8_t>(15);                                                   // 16 bits
+    out.put<std::uint16_t>(static_cast<std::uint16_t>(8 * bytes * static_cast<std::size_t>(c)));
+    out.put<std::uint8_t>(static_cast<std::uint8_t>(8 * bytes - 1));             // bits less one
     out.put<std::uint8_t>(static_cast<std::uint8_t>((c == 3 ? 15 : c) | 0xc0));  // channel; float and signed
     out.put<std::uint32_t>(0);
     out.put<float>(-1.0F);
@@ -128,23 +129,74 @@ class Reader {
   std::uint64_t size_ = 0;
 };
 
+constexpr std::string_view kSwizzleKey = "KTXswizzle";
+constexpr std::string_view kOpaque = "rgb1";
+
+// Whether the file's key/value data say that alpha is to be read as 1.
+bool is_opaque(Reader& in, const std::string& path) {
+  std::uint64_t place = in.get<std::uint32_t>(56);
+  const std::uint64_t end = place + in.get<std::uint32_t>(60);
+  in.require(place, end - place);
+  const std::string wanted = std::string(kSwizzleKey) + '\0' + std::string(kOpaque);
+  while (place < end) {
+    const std::uint64_t size = in.get<std::uint32_t>(place);
+    place += sizeof(std::uint32_t);
+    if (size < 2 || size > end - place) throw FileError(path, "has damaged key/value data");
+    // The value's terminating zero is there or not, as its writer likes.
+    if (size == wanted.size() || size == wanted.size() + 1) {
+      std::string entry(wanted.size(), '\0');
+      in.read(place, entry.data(), entry.size());
+      if (entry == wanted) return true;
+    }
+    place += (size + 3) / 4 * 4;
+  }
+  return false;
+}
+
+EnvMap without_alpha(const EnvMap& map) {
+  EnvMapLayout layout = map.layout;
+  layout.channels = 3;
+  EnvMap result = make_envmap(layout, default_channels(3));
+  for (std::size_t from = 0, to = 0; from < map.values.size(); from += 4, to += 3) {
+    std::copy_n(&map.values[from], 3, &result.values[to]);
+  }
+  return result;
+}
+
 }  // namespace
 
-SaveReport save_ktx2(const std::string& path, const EnvMapView& map) {
-  validate(map);
-  const EnvMapLayout& layout = map.layout;
-  if (layout.projection.kind != ProjectionKind::cube) {
-    throw InvalidArgument("map", to_string(layout.projection), "a cube map: KTX2 stores no other projection");
+bool is_ktx2(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".ktx2";
+}
+
+void check_ktx2_path(const std::string& path, const Projection& projection, PixelFormat format) {
+  if (projection.kind != ProjectionKind::cube) {
+    throw InvalidArgument("map", to_string(projection), "a cube map: KTX2 stores no other projection");
   }
+  if (format == PixelFormat::uint8 || format == PixelFormat::uint16) {
+    throw FileError(path, "its format cannot store these pixels, expected half or float32");
+  }
+  const AtomicFile checks_the_folder(path);
+}
+
+SaveReport save_ktx2(const std::string& path, const EnvMapView& map, PixelFormat pixels) {
+  validate(map);
+  check_ktx2_path(path, map.layout.projection, pixels);
+  const bool whole = pixels == PixelFormat::float32;
+  const EnvMapLayout& layout = map.layout;
   if (layout.channels > 4)
     throw InvalidArgument("channels", std::to_string(layout.channels), "1 to 4 in a KTX2 file");
   const int stored = layout.channels == 3 ? 4 : layout.channels;
-  const Format& format = *std::find_if(kFormats.begin(), kFormats.end(),
-                                       [&](const Format& f) { return f.channels == stored && f.bytes == 2; });
+  const Format& format = *std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& f) {
+    return f.channels == stored && f.bytes == (whole ? 4u : 2u);
+  });
   ByteWriter out;
   for (const std::uint8_t v : kIdentifier) out.put(v);
   out.put(format.vk_format);
-  out.put<std::uint32_t>(2);  // bytes of the type
+  out.put(static_cast<std::uint32_t>(format.bytes));
   out.put(static_cast<std::uint32_t>(layout.width));
   out.put(static_cast<std::uint32_t>(layout.height));
   for (const std::uint32_t v : {0u, 0u, 6u}) out.put(v);  // no depth, no array, six faces
@@ -153,9 +205,10 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map) {
   const std::size_t index = out.bytes.size();
   out.bytes.resize(kHeaderBytes + kLevelBytes * static_cast<std::size_t>(layout.levels));
   const std::size_t data_format = out.bytes.size();
-  put_data_format(out, stored);
+  put_data_format(out, stored, format.bytes);
   const std::size_t keys = out.bytes.size();
   put_key(out, "KTXorientation", "rd");
+  if (layout.channels == 3) put_key(out, kSwizzleKey, kOpaque);
   put_key(out, "KTXwriter", std::string("mirrorbake ") + version());
   out.overwrite(index, static_cast<std::uint32_t>(data_format));
   out.overwrite(index + 4, static_cast<std::uint32_t>(keys - data_format));
@@ -163,16 +216,20 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map) {
   out.overwrite(index + 12, static_cast<std::uint32_t>(out.bytes.size() - keys));
 
   SaveReport report;
-  const std::size_t texel_bytes = 2 * static_cast<std::size_t>(stored);
+  const std::size_t texel_bytes = format.bytes * static_cast<std::size_t>(stored);
   // The coarsest level comes first in the file, so that a viewer can show something early.
   for (int level = layout.levels - 1; level >= 0; --level) {
     out.pad(std::lcm(texel_bytes, std::size_t{4}));
     const std::size_t begin = out.bytes.size();
     const std::span<const float> values = map.level(level);
-    out.bytes.reserve(begin + values.size() * 4);
+    out.bytes.reserve(begin + values.size() / static_cast<std::size_t>(layout.channels) * texel_bytes);
     for (std::size_t i = 0; i < values.size(); i += static_cast<std::size_t>(layout.channels)) {
       for (std::size_t c = 0; c < static_cast<std::size_t>(stored); ++c) {
         float v = c < static_cast<std::size_t>(layout.channels) ? values[i + c] : 1.0F;
+        if (whole) {
+          out.put(v);
+          continue;
+        }
         if (std::abs(v) > 65504.0F) {
           v = std::copysign(65504.0F, v);
           ++report.clamped_to_half;
@@ -231,6 +288,7 @@ EnvMap load_ktx2(const std::string& path, const ImageLimits& limits) {
     if (bytes != expected) throw FileError(path, "has a damaged index: level " + std::to_string(level));
     in.require(offset, bytes);
   }
+  const bool opaque = format->channels == 4 && is_opaque(in, path);
   EnvMap map = make_envmap(layout, default_channels(format->channels));
   std::vector<std::uint16_t> halves;
   for (std::uint32_t level = 0; level < levels; ++level) {
@@ -246,7 +304,7 @@ EnvMap load_ktx2(const std::string& path, const ImageLimits& limits) {
     std::transform(halves.begin(), halves.end(), map.values.begin() + static_cast<std::ptrdiff_t>(first),
                    float_from_half);
   }
-  return map;
+  return opaque ? without_alpha(map) : map;
 }
 
 }  // namespace mirrorbake

@@ -108,29 +108,61 @@ TEST(Half, AMapComesBackRoundedAndWhatIsTooLargeIsClampedAndCounted) {
   EXPECT_THROW(float_from_half(broken), InvalidArgument);
 }
 
-TEST_F(EnvMapFiles, Ktx2ReturnsEveryLevelRoundedToHalf) {
-  for (const int channels : {1, 2, 3, 4}) {
+TEST_F(EnvMapFiles, Ktx2ReturnsEveryLevelInTheFormatAskedFor) {
+  for (const auto& [channels, format] : {std::pair{1, PixelFormat::half},
+                                         {2, PixelFormat::half},
+                                         {3, PixelFormat::half},
+                                         {4, PixelFormat::automatic},
+                                         {1, PixelFormat::float32},
+                                         {3, PixelFormat::float32},
+                                         {4, PixelFormat::float32}}) {
     EnvMap map = make_envmap({parse_projection("cube"), 20, 20, 1, channels});
     for (std::size_t i = 0; i < map.values.size(); ++i) {
       map.values[i] = 100.0F * unit_float(static_cast<std::uint32_t>(hash64(i)));
     }
     const EnvMap mips = build_mips(map, MipFilter::seamless);
-    EXPECT_EQ(save_ktx2(path("a.ktx2"), mips).clamped_to_half, 0u);
-    const EnvMap again = load_envmap(path("a.ktx2"));
-    ASSERT_EQ(again.layout.levels, mips.layout.levels);
-    ASSERT_EQ(again.layout.channels, channels == 3 ? 4 : channels);
-    const std::size_t texels = mips.values.size() / static_cast<std::size_t>(channels);
-    for (std::size_t i = 0; i < texels; ++i) {
-      for (int c = 0; c < again.layout.channels; ++c) {
-        const float expected =
-            c < channels ? mips.values[i * static_cast<std::size_t>(channels) + static_cast<std::size_t>(c)]
-                         : 1.0F;
-        EXPECT_EQ(
-            again.values[i * static_cast<std::size_t>(again.layout.channels) + static_cast<std::size_t>(c)],
-            float_from_half(half_from_float(expected)));
-      }
+    EXPECT_EQ(save_ktx2(path("a.KTX2"), mips, format).clamped_to_half, 0u);
+    const EnvMap again = load_envmap(path("a.KTX2"));
+    ASSERT_EQ(again.layout, mips.layout);
+    for (std::size_t i = 0; i < mips.values.size(); ++i) {
+      const float exact = mips.values[i];
+      EXPECT_EQ(again.values[i],
+                format == PixelFormat::float32 ? exact : float_from_half(half_from_float(exact)));
     }
   }
+}
+
+// Graphics hardware has no three-channel formats: the file stores RGBA.
+TEST_F(EnvMapFiles, Ktx2StoresAlphaOneBesideThreeChannels) {
+  EnvMap map = make_envmap({parse_projection("cube"), 1, 1, 1, 3});
+  std::fill(map.values.begin(), map.values.end(), 0.5F);
+  save_ktx2(path("a.ktx2"), map, PixelFormat::float32);
+  std::ifstream in(path("a.ktx2"), std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  ASSERT_GE(bytes.size(), 6u * 16u);
+  for (std::size_t texel = 0; texel < 6; ++texel) {
+    float rgba[4];
+    std::memcpy(rgba, bytes.data() + bytes.size() - 6 * 16 + texel * 16, sizeof rgba);
+    EXPECT_THAT(rgba, testing::ElementsAre(0.5F, 0.5F, 0.5F, 1.0F));
+  }
+  // Without the note that alpha is to be read as 1 it is a channel like others.
+  bytes.replace(bytes.find("KTXswizzle"), 3, "ktx");
+  std::ofstream(path("b.ktx2"), std::ios::binary) << bytes;
+  EXPECT_EQ(load_ktx2(path("b.ktx2")).layout.channels, 4);
+}
+
+TEST_F(EnvMapFiles, ContradictoryWishesAreErrorsAndWriteNothing) {
+  const EnvMap cube = make_envmap({parse_projection("cube"), 2, 2, 1, 3});
+  const EnvMap panorama = directions("latlong", 8, 4);
+  EXPECT_THROW(save_envmap(path("a.ktx2"), cube, FaceLayout::cross), InvalidArgument);
+  EXPECT_THROW(save_envmap(path("a.ktx2"), cube, FaceLayout::automatic, PixelFormat::uint8), FileError);
+  EXPECT_THROW(save_envmap(path("a_{}.exr"), cube, FaceLayout::strip), InvalidArgument);
+  EXPECT_THROW(save_envmap(path("a.exr"), cube, FaceLayout::files), InvalidArgument);
+  EXPECT_THROW(save_envmap(path("a_{}.exr"), panorama), InvalidArgument);
+  EXPECT_THROW(check_envmap_path(path("a.exr"), parse_projection("dual_paraboloid"), FaceLayout::cross),
+               InvalidArgument);
+  EXPECT_THROW(check_envmap_path(path("none/a.exr"), cube.layout.projection), FileError);
+  EXPECT_TRUE(std::filesystem::is_empty(std::filesystem::path(path("a")).parent_path()));
 }
 
 TEST_F(EnvMapFiles, Ktx2ClampsAndCounts) {
@@ -230,8 +262,6 @@ TEST_F(EnvMapFiles, ShapesThatFitNothingAreErrorsThatNameTheFile) {
   EXPECT_EQ(load_envmap(path("odd.exr"), parse_projection("angular")).layout.width, 7);
 }
 
-// Directions per convention, from the documentation or source of each program: centre, right edge of the right
-// quarter, top of its panorama.
 // Replaces the numbers of an EXR file's data and display windows by those of width × height.
 void claim_size(const std::string& path, std::int32_t width, std::int32_t height) {
   std::string bytes;
@@ -271,6 +301,8 @@ TEST_F(EnvMapFiles, SixtyThousandColumnsAreReadResampledAndSampled) {
   EXPECT_NEAR(integrate(cube)[0] / integrate(read)[0], 1.0, 1e-5);
 }
 
+// Directions per convention, from the documentation or source of each program: centre, right edge of the right
+// quarter, top of its panorama.
 TEST(Conventions, PanoramasLookWhereEachProgramLooks) {
   struct Case {
     const char* name;

@@ -39,7 +39,15 @@ EnvMap unpack_faces(const Image& image, const std::optional<Projection>& project
 EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection = std::nullopt,
                    FaceLayout layout = FaceLayout::automatic, const ImageLimits& limits = {});
 
-/// Writes the finest level as an image, or all levels as KTX2. Throws FileError and InvalidArgument.
+/// What save_envmap would refuse whatever the map's values are, before they are computed. Throws FileError for a path that
+/// cannot be written or stored in `format`; InvalidArgument for a layout or `{}` that does not fit the projection, and a
+/// layout of faces in a KTX2 file, which has its own. Nothing is written.
+void check_envmap_path(const std::string& path, const Projection& projection,
+                       FaceLayout layout = FaceLayout::automatic,
+                       PixelFormat format = PixelFormat::automatic);
+
+/// Writes the finest level as an image, or all levels as KTX2. Throws as check_envmap_path does, and as save_image and
+/// save_ktx2 do.
 SaveReport save_envmap(const std::string& path, const EnvMapView& map,
                        FaceLayout layout = FaceLayout::automatic,
                        PixelFormat format = PixelFormat::automatic);

@@ -8,12 +8,22 @@
 /// KTX 2.0 files (Khronos, "KTX File Format Specification" version 2.0) of cube maps with their levels.
 namespace mirrorbake {
 
-/// Writes a cube map as float16, atomically: one channel as R16, two as R16G16, three and four as R16G16B16A16, where
-/// alpha is 1 if the map has none. Values beyond ±65504 are clamped and counted. Throws InvalidArgument if the map is
-/// not a cube of one to four channels, FileError if the file cannot be written.
-SaveReport save_ktx2(const std::string& path, const EnvMapView& map);
+/// Whether the extension is .ktx2, in capitals or not.
+bool is_ktx2(const std::string& path);
 
-/// Reads a cube map of float16 or float32 with one to four channels and any number of levels, not supercompressed.
+/// Writes a cube map as float16 (`automatic`, `half`) or float32, atomically: one channel as R, two as RG, three and four as
+/// RGBA. Of three channels the file says that its alpha is to be read as 1 (KTXswizzle "rgb1"). Values beyond ±65504 are
+/// clamped to float16 and counted. Throws InvalidArgument if the map is not a cube of one to four channels, FileError if
+/// the file cannot be written or `format` is another.
+SaveReport save_ktx2(const std::string& path, const EnvMapView& map,
+                     PixelFormat format = PixelFormat::automatic);
+
+/// What save_ktx2 would refuse whatever the map's values are, by the same errors. Nothing is written.
+void check_ktx2_path(const std::string& path, const Projection& projection,
+                     PixelFormat format = PixelFormat::automatic);
+
+/// Reads a cube map of float16 or float32 with one to four channels and any number of levels, not supercompressed. An
+/// alpha that is to be read as 1 is left out.
 /// Throws FileError for anything else, damaged files and those beyond `limits`.
 EnvMap load_ktx2(const std::string& path, const ImageLimits& limits = {});
 

@@ -411,6 +411,7 @@ void IrregularTexels::trace_around(int face, glm::dvec2 low, glm::dvec2 high) {
 // The part of the rectangle in the unit disc: where its sides leave the disc, it goes on along the rim.
 void IrregularTexels::trace_within_disc(int face, glm::dvec2 low, glm::dvec2 high) {
   const std::array<glm::dvec2, 4> corners = {low, glm::dvec2(high.x, low.y), high, glm::dvec2(low.x, high.y)};
+  const auto is_same = [](glm::dvec2 a, glm::dvec2 b) { return glm::dot(a - b, a - b) < 1e-18; };
   std::optional<OutlinePoint> first;
   std::optional<OutlinePoint> before;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -426,12 +427,12 @@ void IrregularTexels::trace_within_disc(int face, glm::dvec2 low, glm::dvec2 hig
     if (!(enter < leave)) continue;
     const OutlinePoint from = outline_point(face, a + enter * side);
     const OutlinePoint to = outline_point(face, a + leave * side);
-    if (before && enter > 0.0) trace(face, *before, from, true, 0);
+    if (before && !is_same(before->at, from.at)) trace(face, *before, from, true, 0);
     trace(face, from, to, false, 0);
     if (!first) first = from;
     before = to;
   }
-  if (first && glm::dot(first->at, first->at) > 1.0 - 1e-12) trace(face, *before, *first, true, 0);
+  if (first && !is_same(before->at, first->at)) trace(face, *before, *first, true, 0);
 }
 
 // So that neighbours are at most half a turn apart. Along a pole the polygon goes from one column to the next; an

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from mirrorbake import _core as core
 
@@ -25,12 +26,19 @@ mi = pytest.importorskip("mitsuba")
 SIZE = 32
 BLOCK = 8
 SAMPLES = 64
-# Independent images per renderer, from which the variance of a block's mean is taken. Of fewer, that of caustics which
-# Mitsuba finds by luck would be too uncertain.
-IMAGES = 64 if os.environ.get("MIRRORBAKE_LONG_TESTS") == "1" else 16
+LONG = os.environ.get("MIRRORBAKE_LONG_TESTS") == "1"
+# Independent images per renderer, from which the variance of a block's mean is taken.
+IMAGES = 64 if LONG else 16
+
+
+def largest_z(z: float) -> float:
+    """As unlikely as `z`, where the variance is that of few images: Mitsuba's are the noisy ones."""
+    return z if LONG else float(stats.t.isf(stats.norm.sf(z), IMAGES - 1))
+
+
 # Of 48 block means per scene; of all of them together, in which a bias adds up, at 99 %.
-LARGEST_Z = 4.0
-LARGEST_MEAN_Z = 2.6
+LARGEST_Z = largest_z(4.0)
+LARGEST_MEAN_Z = largest_z(2.6)
 # What is left without noise: float rounding, and edges of shadows that fall between two samples.
 FLOOR = 2e-4
 

@@ -124,7 +124,7 @@ glm::vec3 point_at(const World& world, const Hit& hit) {
 
 void CausticGuide::shoot_one(const World& world, const Hit& start, float area, const SampleStream& stream,
                              Photons& photons) {
-  const std::optional<LightSample> light = world.lights.sample(point_at(world, start), stream.get(1));
+  const std::optional<LightSample> light = world.lights.sample(point_at(world, start), stream.get(1), false);
   if (!light) return;
   Surface surface = surface_at(world.scene, world.rays, start, -light->direction);
   // A mirror's image of a point light is found by no ray.

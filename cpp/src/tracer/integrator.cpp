@@ -52,6 +52,7 @@ glm::vec3 fresnel_ratio(const Surface& surface, const Lobe& lobe, glm::vec3 ligh
 struct Partners {
   bool cosine = false;
   bool lobe = false;
+  bool all = false;  ///< of those that the surface has
 };
 
 // Density of the cosine, by which diffuse paths go on; 0 below the surface.
@@ -67,7 +68,7 @@ struct DirectLight {
 
 DirectLight direct_light(const World& world, const Surface& surface, glm::vec2 u, Partners partners,
                          bool for_lobe) {
-  const std::optional<LightSample> light = world.lights.sample(surface.position, u);
+  const std::optional<LightSample> light = world.lights.sample(surface.position, u, partners.all);
   if (!light) return {};
   const float cosine = glm::dot(surface.normal, light->direction);
   if (!(cosine > 0.0F) || !(glm::dot(surface.geometric_normal, light->direction) > 0.0F)) return {};
@@ -101,6 +102,10 @@ DirectLight direct_light(const World& world, const Surface& surface, glm::vec2 u
   return found;
 }
 
+bool diffuse_follows(const World& world, const PathLimits& limits) {
+  return world.options.indirect == IndirectLight::path && limits.diffuse_depth > 0;
+}
+
 bool specular_follows(const Surface& surface, const PathLimits& limits, int bounce) {
   return surface.specular() && bounce <= limits.specular_depth;
 }
@@ -108,7 +113,8 @@ bool specular_follows(const Surface& surface, const PathLimits& limits, int boun
 }  // namespace
 
 glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec2 u, bool share_with_cosine) {
-  return direct_light(world, surface, u, {.cosine = share_with_cosine}, false).irradiance;
+  return direct_light(world, surface, u, {.cosine = share_with_cosine, .all = share_with_cosine}, false)
+      .irradiance;
 }
 
 ScatteredLight scattered_light(const World& world, const Surface& surface, const PathLimits& limits,
@@ -116,10 +122,10 @@ ScatteredLight scattered_light(const World& world, const Surface& surface, const
   const bool has_body = surface.albedo != glm::vec3(0.0F);
   const bool has_lobe = surface.rough() && specular_follows(surface, limits, bounce);
   if (!has_body && !has_lobe) return {};
-  const bool path = has_body && world.options.indirect == IndirectLight::path && limits.diffuse_depth > 0;
+  const bool path = diffuse_follows(world, limits);
   const DirectLight direct =
       direct_light(world, surface, stream.get(dimension_base(bounce, 0) + light_dimension),
-                   {.cosine = path, .lobe = true}, has_lobe);
+                   {.cosine = path, .lobe = true, .all = path}, has_lobe);
   ScatteredLight light;
   light.lobe = direct.lobe;
   if (!has_body) return light;
@@ -149,9 +155,9 @@ SpecularBounce specular_bounce(const Surface& surface, const SampleStream& strea
   return specular_bounce(surface, u);
 }
 
-glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf) {
+glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf, bool shared) {
   if (hit.missed()) {
-    const EnvironmentSampler::Found found = world.lights.environment(ray.direction);
+    const EnvironmentSampler::Found found = world.lights.environment(ray.direction, shared);
     return pdf > 0.0F ? power_heuristic(pdf, found.pdf) * found.radiance : found.radiance;
   }
   const int light = world.light_number(hit);
@@ -175,7 +181,8 @@ glm::vec3 radiance(const World& world, const Ray& first_ray, const Hit& first_hi
   Ray ray = first_ray;
   Hit hit = first_hit;
   for (;; ++bounce) {
-    if (hit.missed() || world.is_light(hit)) return sum + throughput * emitted_light(world, ray, hit, pdf);
+    if (hit.missed() || world.is_light(hit))
+      return sum + throughput * emitted_light(world, ray, hit, pdf, diffuse_follows(world, limits));
     const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
     const ScatteredLight scattered = scattered_light(world, surface, limits, stream, bounce);
     sum += throughput * (emitted_light(world, ray, hit, surface, pdf) + scattered.body);
@@ -229,7 +236,7 @@ glm::vec3 guided_light(const World& world, const Surface& start, CausticGuide::C
   for (int chain = 0;; ++chain) {
     const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
     if (hit.missed() || world.is_light(hit)) {
-      return chain > 0 ? sum + throughput * emitted_light(world, ray, hit, lobe_pdf) : sum;
+      return chain > 0 ? sum + throughput * emitted_light(world, ray, hit, lobe_pdf, true) : sum;
     }
     const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
     if (chain > 0) sum += throughput * emitted_light(world, ray, hit, surface, lobe_pdf);
@@ -239,7 +246,7 @@ glm::vec3 guided_light(const World& world, const Surface& start, CausticGuide::C
     glm::vec2 lobe(0.0F);
     if (surface.rough()) {
       const std::uint32_t use = guide_dimension + 1 + 2 * static_cast<std::uint32_t>(chain);
-      sum += throughput * direct_light(world, surface, numbers(use), {.lobe = true}, true).lobe;
+      sum += throughput * direct_light(world, surface, numbers(use), {.lobe = true, .all = true}, true).lobe;
       lobe = numbers(use + 1);
     }
     const SpecularBounce next = specular_bounce(surface, lobe);
@@ -267,7 +274,8 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
   int diffuse_bounces = 0;
   int specular_bounces = 0;
   glm::vec3 direction(0.0F);
-  float pdf = 0.0F;  // 0 after a mirror: emission counts in full
+  float pdf = 0.0F;    // 0 after a mirror: emission counts in full
+  bool shared = true;  // what next-event estimation took the followed rays for
   // Since the last diffuse surface: what is known of caustics there, the specular surfaces passed, and the weight of
   // the light that they show.
   CausticGuide::Cell cell;
@@ -291,7 +299,7 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
     const Ray ray{offset_origin(surface, direction), direction};
     const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
     if (hit.missed() || world.is_light(hit))
-      return sum + chain_weight * throughput * emitted_light(world, ray, hit, pdf);
+      return sum + chain_weight * throughput * emitted_light(world, ray, hit, pdf, shared);
     surface = surface_at(world.scene, world.rays, hit, direction);
     sum += chain_weight * throughput * emitted_light(world, ray, hit, surface, pdf);
 
@@ -302,9 +310,11 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
     const bool has_lobe = surface.rough() && continue_specular;
     if (continue_specular && chain == 0) chain_weight = guided_partner_weight(world, cell, direction, pdf);
     if (chain == CausticGuide::kSpecularBounces) chain_weight = 1.0F;
+    shared = continue_diffuse || !has_body;
     if (has_body || has_lobe) {
-      const DirectLight direct = direct_light(world, surface, numbers(light_dimension),
-                                              {.cosine = continue_diffuse, .lobe = true}, has_lobe);
+      const DirectLight direct =
+          direct_light(world, surface, numbers(light_dimension),
+                       {.cosine = continue_diffuse, .lobe = true, .all = shared}, has_lobe);
       sum += throughput *
              (surface.albedo * kInversePi * direct.irradiance + chain_weight * surface.fresnel * direct.lobe);
     }

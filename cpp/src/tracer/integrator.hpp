@@ -46,8 +46,8 @@ SpecularBounce specular_bounce(const Surface& surface, const SampleStream& strea
 
 /// Emission of a light, of the sky or of `surface`, which the hit is on, towards the ray's origin. Where
 /// next-event estimation could have found it too it is weighted for a direction of density `pdf`; 0: it could
-/// not.
-glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf);
+/// not. `shared` as it was for next-event estimation (Lights).
+glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf, bool shared);
 glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, const Surface& surface,
                         float pdf);
 

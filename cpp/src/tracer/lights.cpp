@@ -129,13 +129,10 @@ EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
     return static_cast<double>(scale_) * static_cast<double>(luminance({p[0], p[1], p[2]}));
   };
   const auto w = static_cast<std::size_t>(width);
-  row_cdf_.resize(static_cast<std::size_t>(height) + 1);
   for (int y = 0; y <= height; ++y) row_cosine_.push_back(std::cos(std::numbers::pi * y / height));
-  column_cdf_.resize(static_cast<std::size_t>(height) * (w + 1));
-  std::vector<double> row_sums(static_cast<std::size_t>(height));
-  std::vector<double> row(w);
+  std::vector<float> means(w * static_cast<std::size_t>(height));
   for (int y = 0; y < height; ++y) {
-    // Mean of the bilinear interpolant over the texel: weights 1/8, 3/4, 1/8 each way. The density is
+    // Mean of the bilinear interpolant over the texel: weights 1/8, 3/4, 1/8 each way. The density by luminance is
     // positive wherever the radiance is.
     for (int x = 0; x < width; ++x) {
       double mean = 0.0;
@@ -144,13 +141,32 @@ EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
           mean += (i == 0 ? 0.75 : 0.125) * (j == 0 ? 0.75 : 0.125) * value(x + i, y + j);
         }
       }
-      row[static_cast<std::size_t>(x)] = mean;
+      means[static_cast<std::size_t>(y) * w + static_cast<std::size_t>(x)] = static_cast<float>(mean);
     }
-    const double sum = normalise_cdf(&column_cdf_[static_cast<std::size_t>(y) * (w + 1)], row.data(), width);
-    const auto edge = static_cast<std::size_t>(y);
-    row_sums[edge] = sum * (row_cosine_[edge] - row_cosine_[edge + 1]) * 2.0 * std::numbers::pi / width;
   }
-  flux_ = normalise_cdf(row_cdf_.data(), row_sums.data(), height);
+  by_luminance_ = distribution(means, 0.0);
+  by_excess_ = distribution(means, by_luminance_.flux / (4.0 * std::numbers::pi));
+  if (!(by_excess_.flux > 0.0)) by_excess_ = by_luminance_;  // an even sky
+}
+
+EnvironmentSampler::Distribution EnvironmentSampler::distribution(const std::vector<float>& luminance,
+                                                                  double threshold) const {
+  const auto width = static_cast<std::size_t>(panorama_->width);
+  const auto height = static_cast<std::size_t>(panorama_->height);
+  Distribution d;
+  d.row_cdf.resize(height + 1);
+  d.column_cdf.resize(height * (width + 1));
+  std::vector<double> row_sums(height);
+  std::vector<double> row(width);
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      row[x] = std::max(0.0, static_cast<double>(luminance[y * width + x]) - threshold);
+    }
+    const double sum = normalise_cdf(&d.column_cdf[y * (width + 1)], row.data(), panorama_->width);
+    row_sums[y] = sum * (row_cosine_[y] - row_cosine_[y + 1]) * 2.0 * std::numbers::pi / panorama_->width;
+  }
+  d.flux = normalise_cdf(d.row_cdf.data(), row_sums.data(), panorama_->height);
+  return d;
 }
 
 glm::vec3 EnvironmentSampler::radiance(glm::vec2 uv) const {
@@ -172,17 +188,17 @@ glm::vec3 EnvironmentSampler::radiance(glm::vec2 uv) const {
                    fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1)));
 }
 
-float EnvironmentSampler::pdf(int x, int y) const {
+float EnvironmentSampler::pdf(const Distribution& d, int x, int y) const {
   const auto edge = static_cast<std::size_t>(y);
   const int width = panorama_->width;
-  const float* row = &column_cdf_[edge * (static_cast<std::size_t>(width) + 1)];
-  const float probability = (row_cdf_[edge + 1] - row_cdf_[edge]) * (row[x + 1] - row[x]);
+  const float* row = &d.column_cdf[edge * (static_cast<std::size_t>(width) + 1)];
+  const float probability = (d.row_cdf[edge + 1] - d.row_cdf[edge]) * (row[x + 1] - row[x]);
   // Samples are uniform in solid angle within a texel.
   const double solid_angle = (row_cosine_[edge] - row_cosine_[edge + 1]) * 2.0 * std::numbers::pi / width;
   return static_cast<float>(probability / solid_angle);
 }
 
-EnvironmentSampler::Found EnvironmentSampler::find(glm::vec3 direction) const {
+EnvironmentSampler::Found EnvironmentSampler::find(glm::vec3 direction, bool shared) const {
   // Undo the rotation about +Y, then: the centre is −Z, +X to its right.
   const float x = cosine_ * direction.x - sine_ * direction.z;
   const float z = sine_ * direction.x + cosine_ * direction.z;
@@ -191,16 +207,19 @@ EnvironmentSampler::Found EnvironmentSampler::find(glm::vec3 direction) const {
                      std::clamp(std::atan2(std::sqrt(x * x + z * z), direction.y) / kPi, 0.0F, 1.0F));
   const int width = panorama_->width;
   const int height = panorama_->height;
-  return {radiance(uv), pdf(std::min(static_cast<int>(uv.x * static_cast<float>(width)), width - 1),
+  return {radiance(uv), pdf(shared ? by_excess_ : by_luminance_,
+                            std::min(static_cast<int>(uv.x * static_cast<float>(width)), width - 1),
                             std::min(static_cast<int>(uv.y * static_cast<float>(height)), height - 1))};
 }
 
-EnvironmentSampler::Sample EnvironmentSampler::sample(glm::vec2 u) const {
+EnvironmentSampler::Sample EnvironmentSampler::sample(glm::vec2 u, bool shared) const {
+  const Distribution& d = shared ? by_excess_ : by_luminance_;
   const int width = panorama_->width;
   const int height = panorama_->height;
-  const CdfSample row = sample_cdf(row_cdf_.data(), height, u.y);
+  const CdfSample row = sample_cdf(d.row_cdf.data(), height, u.y);
   const auto edge = static_cast<std::size_t>(row.index);
-  const CdfSample column = sample_cdf(&column_cdf_[edge * (static_cast<std::size_t>(width) + 1)], width, u.x);
+  const CdfSample column =
+      sample_cdf(&d.column_cdf[edge * (static_cast<std::size_t>(width) + 1)], width, u.x);
   const float across = (static_cast<float>(column.index) + column.place) / static_cast<float>(width);
   const double y = row_cosine_[edge] + row.place * (row_cosine_[edge + 1] - row_cosine_[edge]);
   const auto radius = static_cast<float>(std::sqrt(std::max(0.0, (1.0 - y) * (1.0 + y))));
@@ -209,7 +228,7 @@ EnvironmentSampler::Sample EnvironmentSampler::sample(glm::vec2 u) const {
   const float z = -radius * std::cos(azimuth);
   const glm::vec3 direction(cosine_ * x + sine_ * z, y, -sine_ * x + cosine_ * z);
   const glm::vec2 uv(across, std::atan2(radius, direction.y) / kPi);
-  return {glm::normalize(direction), {radiance(uv), pdf(column.index, row.index)}};
+  return {glm::normalize(direction), {radiance(uv), pdf(d, column.index, row.index)}};
 }
 
 Lights::Lights(const Scene& scene, const RayScene& rays)
@@ -313,7 +332,7 @@ void Lights::add(Kind kind, int index, double power) {
   if (power > 0.0) lights_.push_back({kind, index, power});
 }
 
-std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u) const {
+std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u, bool shared) const {
   if (lights_.empty()) return std::nullopt;
   const CdfSample pick = sample_cdf(cdf_.data(), static_cast<int>(lights_.size()), u.x);
   const Light& light = lights_[static_cast<std::size_t>(pick.index)];
@@ -345,7 +364,7 @@ std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u) const
       break;
     case Kind::mesh: sample = sample_mesh(light.index, position, u); break;
     case Kind::environment: {
-      const EnvironmentSampler::Sample sky = environment_->sample(u);
+      const EnvironmentSampler::Sample sky = environment_->sample(u, shared);
       const float pdf = sky.found.pdf;
       if (pdf > 0.0F) {
         sample = {sky.direction, std::numeric_limits<float>::infinity(), sky.found.radiance / pdf, pdf};
@@ -416,9 +435,9 @@ std::optional<LightSample> Lights::sample_rectangle(const Rectangle& r, glm::vec
   return LightSample{direction, distance, r.radiance / pdf, pdf};
 }
 
-EnvironmentSampler::Found Lights::environment(glm::vec3 direction) const {
+EnvironmentSampler::Found Lights::environment(glm::vec3 direction, bool shared) const {
   if (!environment_) return {glm::vec3(0.0F), 0.0F};
-  EnvironmentSampler::Found found = environment_->find(direction);
+  EnvironmentSampler::Found found = environment_->find(direction, shared);
   found.pdf *= environment_probability_;
   return found;
 }

@@ -29,31 +29,42 @@ class EnvironmentSampler {
     glm::vec3 radiance;
     float pdf;  ///< density per solid angle with which `sample` takes the direction
   };
-  Found find(glm::vec3 direction) const;
+  /// `shared`: see Lights.
+  Found find(glm::vec3 direction, bool shared) const;
   struct Sample {
     glm::vec3 direction;  ///< unit
     Found found;
   };
-  Sample sample(glm::vec2 u) const;
+  Sample sample(glm::vec2 u, bool shared) const;
   /// ∫ luminance dω.
-  double flux() const { return flux_; }
+  double flux() const { return by_luminance_.flux; }
 
  private:
   glm::vec3 radiance(glm::vec2 uv) const;
-  float pdf(int x, int y) const;  ///< in a texel
+  struct Distribution {
+    std::vector<float> row_cdf;     ///< height + 1
+    std::vector<float> column_cdf;  ///< height × (width + 1)
+    double flux = 0.0;              ///< ∫ of what it is made from
+  };
+  /// Of the texels' luminance above `threshold`.
+  Distribution distribution(const std::vector<float>& luminance, double threshold) const;
+  float pdf(const Distribution& d, int x, int y) const;  ///< in a texel
 
   const Image* panorama_;
   float scale_;
   float cosine_;  ///< of the rotation
   float sine_;
-  double flux_ = 0.0;
   std::vector<double> row_cosine_;  ///< height + 1: cosines of the rows' edges to +Y
-  std::vector<float> row_cdf_;      ///< height + 1
-  std::vector<float> column_cdf_;   ///< height × (width + 1)
+  Distribution by_luminance_;
+  Distribution by_excess_;  ///< above the average; for shared directions
 };
 
 /// All lights of a scene, one of which is picked per sample with a probability that mixes equal shares with
 /// shares by emitted power.
+///
+/// `shared` says of a surface that followed rays take every direction from which it reflects light. Then the even part of
+/// the sky is left to them, and samples go to what is brighter than the average (Karlík et al., "MIS Compensation:
+/// Optimizing Sampling Techniques in Multiple Importance Sampling", ACM TOG 38(6), 2019, §5).
 class Lights {
  public:
   Lights(const Scene& scene, const RayScene& rays);
@@ -61,10 +72,10 @@ class Lights {
   bool empty() const { return lights_.empty(); }
 
   /// A direction from `position` to a light; nothing if the light turns its back.
-  std::optional<LightSample> sample(glm::vec3 position, glm::vec2 u) const;
+  std::optional<LightSample> sample(glm::vec3 position, glm::vec2 u, bool shared) const;
 
   /// What a ray in `direction` finds where it leaves the scene, and the density with which `sample` takes it.
-  EnvironmentSampler::Found environment(glm::vec3 direction) const;
+  EnvironmentSampler::Found environment(glm::vec3 direction, bool shared) const;
 
   /// What a ray finds that hits light number `light`: the rectangles come first, then the spheres.
   glm::vec3 hit_radiance(int light, const Ray& ray) const;

@@ -428,6 +428,36 @@ TEST(Light, EnvironmentFollowsTheLatitudeLongitudeConvention) {
   }
 }
 
+// A sky of 1 with a sun of one texel. Next-event estimation alone looks for all of it; where rays follow the cosine, it
+// looks for the sun only, and the answer is the same.
+TEST(Light, EvenPartOfTheSkyIsLeftToFollowedRays) {
+  Scene scene;
+  add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
+  scene.environment = constant_environment(1.0F);
+  Image& sky = scene.environment->panorama;
+  sky = Image(64, 32, {"R", "G", "B"});
+  std::fill(sky.pixels.begin(), sky.pixels.end(), 1.0F);
+  for (int c = 0; c < 3; ++c) sky.at(48, 8)[c] = 101.0F;
+  const double solid_angle = 2 * kPi / 64 * (std::cos(8 * kPi / 32) - std::cos(9 * kPi / 32));
+  const double expected = 1.0 + 100.0 * solid_angle * std::cos(8.5 * kPi / 32) / kPi;
+  const auto traced = [&](IndirectLight mode, int diffuse_depth) {
+    TraceOptions options;
+    options.samples_per_pixel = 16;
+    options.max_diffuse_depth = diffuse_depth;
+    const Tracer tracer(scene, indirect(mode));
+    const Estimate got = estimate(tracer.trace_beauty(spot(glm::vec3(0.0F)), options));
+    // Interpolation spreads the sun over its neighbours, which changes its cosine a little.
+    EXPECT_NEAR(got.mean, expected, 4.0 * got.error + 0.002 * expected);
+    return got;
+  };
+  const Estimate alone = traced(IndirectLight::none, 0);
+  const Estimate without_depth = traced(IndirectLight::path, 0);
+  EXPECT_EQ(without_depth.error, alone.error);
+  const Estimate followed = traced(IndirectLight::path, 1);
+  EXPECT_GT(followed.error, 0.0);
+  EXPECT_LT(followed.error, 0.5 * alone.error);  // it would be 0.8 if both looked for all of the sky
+}
+
 // The two ways to follow diffuse light agree where the cache can be exact: a finely cut open box.
 TEST(Light, CachedAndPathIndirectLightAgree) {
   Scene scene;

@@ -14,12 +14,14 @@ Examples
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import index
 from os import fspath
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.projection import vectors
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["EnvMap", "Resampler"]
 
+_MAX_SIDE = 65536  # texels, as in C++
 _NAMES = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}
 
 
@@ -160,12 +163,18 @@ class EnvMap:
             where the map shrinks, interpolation where it grows.
         source_from_target
             Rotation or reflection of directions, 3×3.
+
+        Raises
+        ------
+        InvalidArgument
+            For unknown names, sizes that are not 1 to 65536 or do not fit the projection, and matrices that
+            are not orthonormal.
         """
         resampler = _resampler(self.layout, projection, size, filter, source_from_target, 0)
         return _resampled(resampler, self)
 
     def mips(self, filter: str = "seamless") -> EnvMap:
-        """All levels down to 1×1, by ``box``, ``solid_angle`` or ``seamless``."""
+        """All levels down to 1×1, by ``box``, ``solid_angle`` or ``seamless``; else InvalidArgument."""
         values = _core.build_mips(self.layout, self.values, filter)
         width, height = self.layout.width, self.layout.height
         levels = _core.full_level_count(width, height)
@@ -177,7 +186,13 @@ class EnvMap:
         return _core.measure_seam(self.layout, self.values, level)
 
     def with_border(self, border: int, level: int = 0) -> NDArray[np.float32]:
-        """Faces of a level with ``border`` texels of their neighbours around: (faces, height, width, C)."""
+        """Faces of a level with ``border`` texels of their neighbours around: (faces, height, width, C).
+
+        Raises
+        ------
+        InvalidArgument
+            For a border below 0 or wider than a face.
+        """
         return _core.add_border(self.layout, self.values, level, border)
 
     def sample(
@@ -196,17 +211,21 @@ class EnvMap:
         Raises
         ------
         InvalidArgument
-            For NaN, infinite and zero directions, and for missing differentials.
+            For NaN, infinite and zero directions, for missing differentials, and for other shapes.
         """
-        array = np.asarray(directions, np.float32)
+        array = vectors("directions", directions, 3)
 
-        def vectors(a: ArrayLike | None) -> NDArray[np.float32] | None:
-            return (
-                None if a is None else np.broadcast_to(np.asarray(a, np.float32), array.shape).reshape(-1, 3)
-            )
+        def differentials(name: str, a: ArrayLike | None) -> NDArray[np.float32] | None:
+            return None if a is None else np.broadcast_to(vectors(name, a, 3), array.shape).reshape(-1, 3)
 
         values = _core.sample(
-            self.layout, self.values, array.reshape(-1, 3), vectors(ddx), vectors(ddy), filter, max_anisotropy
+            self.layout,
+            self.values,
+            array.reshape(-1, 3),
+            differentials("ddx", ddx),
+            differentials("ddy", ddy),
+            filter,
+            max_anisotropy,
         )
         return values.reshape((*array.shape[:-1], self.layout.channels))
 
@@ -227,7 +246,7 @@ class EnvMap:
         return np.asarray(_core.integrate(self.layout, self.values, level))
 
     def compare(self, reference: EnvMap) -> _core.Comparison:
-        """Errors of the finest level against a reference of the same layout."""
+        """Errors of the finest level against a reference; InvalidArgument unless its layout is the same."""
         return _core.compare_envmaps(self.layout, self.values, reference.layout, reference.values)
 
 
@@ -285,6 +304,20 @@ class Resampler:
         return self._resampler.bytes
 
 
+def _height_and_width(projection: str, size: int | tuple[int, int]) -> tuple[int, int]:
+    try:
+        if isinstance(size, tuple | list):
+            height, width = (index(side) for side in size)
+        else:
+            height = index(size)
+            width = 2 * height if projection == "latlong" else height
+    except (TypeError, ValueError):
+        raise _core.InvalidArgument(f"size is {size!r}, expected a height, or (height, width)") from None
+    if max(height, width) > _MAX_SIDE:
+        raise _core.InvalidArgument(f"size is {size!r}, expected 1 to {_MAX_SIDE} texels a side")
+    return height, width
+
+
 def _resampler(
     source: _core.EnvMapLayout,
     projection: str,
@@ -293,9 +326,7 @@ def _resampler(
     source_from_target: ArrayLike | None,
     max_bytes: int,
 ) -> _core.Resampler:
-    if isinstance(size, int):
-        size = (size, 2 * size if projection == "latlong" else size)
-    height, width = size
+    height, width = _height_and_width(projection, size)
     matrix = np.eye(3, dtype=np.float32) if source_from_target is None else source_from_target
     matrix = np.ascontiguousarray(matrix, np.float32)
     if matrix.shape != (3, 3):

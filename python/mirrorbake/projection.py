@@ -26,6 +26,20 @@ __all__ = [
 ]
 
 
+def vectors(name: str, values: ArrayLike, components: int) -> NDArray[np.float32]:
+    """Return values of shape (..., components) as float32.
+
+    Raises
+    ------
+    InvalidArgument
+        For other shapes; it calls the values by ``name``.
+    """
+    array = np.asarray(values, np.float32)
+    if array.shape[-1:] != (components,):
+        raise _core.InvalidArgument(f"{name} has the shape {array.shape}, expected (..., {components})")
+    return array
+
+
 def points_from_directions(
     projection: str, directions: ArrayLike
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
@@ -46,7 +60,7 @@ def points_from_directions(
     Raises
     ------
     InvalidArgument
-        For NaN, infinite and zero directions.
+        For NaN, infinite and zero directions, and for other shapes.
 
     Examples
     --------
@@ -54,7 +68,7 @@ def points_from_directions(
     >>> int(face), point.tolist()
     (5, [-0.5, 0.25])
     """
-    array = np.asarray(directions, np.float32)
+    array = vectors("directions", directions, 3)
     faces, points = _core.points_from_directions(projection, array.reshape(-1, 3))
     return faces.reshape(array.shape[:-1]), points.reshape((*array.shape[:-1], 2))
 
@@ -69,7 +83,7 @@ def directions_from_points(projection: str, faces: ArrayLike, points: ArrayLike)
     InvalidArgument
         For faces that do not exist and positions that are not finite.
     """
-    array = np.asarray(points, np.float32)
+    array = vectors("points", points, 2)
     numbers = np.broadcast_to(np.asarray(faces, np.int32), array.shape[:-1])
     directions = _core.directions_from_points(
         projection, np.ascontiguousarray(numbers.reshape(-1)), array.reshape(-1, 2)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mirrorbake import _core
 from mirrorbake.envmap import EnvMap, Resampler
-from mirrorbake.projection import texel_directions
+from mirrorbake.projection import directions_from_points, points_from_directions, texel_directions
 
 PROJECTIONS = ["cube", "dual_paraboloid", "sphere_map", "latlong", "angular", "fisheye:360"]
 
@@ -215,3 +215,20 @@ def test_the_flux_of_a_photographed_panorama_is_kept_between_any_two_projections
             np.testing.assert_allclose(
                 after.flux(), before.flux(), rtol=1e-3, err_msg=f"{source} to {target}"
             )
+
+
+def test_wrong_shapes_and_sizes_are_named() -> None:
+    cube = noise("cube", 4)
+    for directions in ([1.0, 0.0], np.ones((2, 6)), 1.0):
+        with pytest.raises(_core.InvalidArgument, match=r"directions has the shape .*expected \(\.\.\., 3\)"):
+            cube.sample(directions)
+        with pytest.raises(_core.InvalidArgument, match="directions has the shape"):
+            points_from_directions("cube", directions)
+    with pytest.raises(_core.InvalidArgument, match="ddx has the shape"):
+        cube.sample([0.0, 0.0, 1.0], [0.0, 1.0], [0.0, 0.0, 1.0], filter="ewa")
+    with pytest.raises(_core.InvalidArgument, match="points has the shape"):
+        directions_from_points("cube", 0, [0.0, 0.0, 0.0])
+    for size in (2.5, None, "a", (3,), (2, 2, 2), 10**12, (4.0, 4.0)):
+        with pytest.raises(_core.InvalidArgument, match="size is"):
+            cube.resample("cube", size)  # type: ignore[arg-type]
+    assert cube.resample("cube", np.int64(2)).layout.width == 2  # type: ignore[arg-type]

@@ -109,7 +109,24 @@ class EnvMap:
     def save(
         self, path: str | PathLike[str], *, faces: str = "automatic", format: str = "automatic"
     ) -> _core.SaveReport:
-        """Write the finest level as an image, or all levels as KTX2, atomically."""
+        """Write the finest level as an image, or all levels as KTX2, atomically.
+
+        Parameters
+        ----------
+        path
+            The extension decides the kind of file; ``{}`` in it stands for the name of the face.
+        faces
+            ``automatic``, ``strip``, ``column``, ``grid``, ``cross``, ``vertical_cross`` or ``files``.
+        format
+            ``automatic``, ``half``, ``float32``, ``uint8`` or ``uint16``.
+
+        Raises
+        ------
+        FileError
+            If the path cannot be written, or that kind of file does not hold the format or the channels.
+        InvalidArgument
+            For unknown names, and faces that do not fit the projection or the path.
+        """
         return _core.save_envmap(fspath(path), self.layout, self.values, self.channels, faces, format)
 
     @property

@@ -174,6 +174,7 @@ def test_an_independent_reader_finds_every_level_of_a_ktx2(tmp_path: Path) -> No
           format: k.vkFormat, width: k.pixelWidth, height: k.pixelHeight, faces: k.faceCount,
           levels: k.levels.map(l => Buffer.from(l.levelData).toString('base64')),
           transfer: d.transferFunction, samples: d.samples.length, keys: Object.keys(k.keyValue),
+          swizzle: k.keyValue.KTXswizzle,
         }));
         """
     )
@@ -183,7 +184,8 @@ def test_an_independent_reader_finds_every_level_of_a_ktx2(tmp_path: Path) -> No
     found = json.loads(done.stdout)
     assert (found["format"], found["width"], found["height"], found["faces"]) == (97, 8, 8, 6)
     assert (found["transfer"], found["samples"]) == (1, 4)
-    assert found["keys"] == ["KTXorientation", "KTXwriter"]
+    assert found["keys"] == ["KTXorientation", "KTXswizzle", "KTXwriter"]
+    assert found["swizzle"].rstrip("\0") == "rgb1"
     assert len(found["levels"]) == 4
     for index, text in enumerate(found["levels"]):
         texels = np.frombuffer(base64.b64decode(text), np.float16).reshape(*mips.level(index).shape[:3], 4)

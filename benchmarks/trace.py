@@ -3,7 +3,8 @@
 Two scenes, paths of any length: a box room with a rectangle light and a mirror ball of 9,000 triangles, which
 throws caustics, and a matte teapot under a sky with a sun, which does not.
 Times are scaled to equal error: a renderer with half the variance at the same time counts as twice as fast.
-Then one thread against two, and the tracer's time and memory for balls of 10,000 to 5 million triangles.
+Before them rays alone, as in benchmarks/rays.py; after them one thread against two, and the tracer's time and
+memory for balls of 10,000 to 5 million triangles.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import mitsuba as mi
 import numpy as np
 
+from benchmarks import rays
 from benchmarks._report import Case, require, run, seconds
 from mirrorbake import _core as core
 
@@ -254,6 +256,7 @@ def triangles() -> Iterator[Case]:
 
 
 def all_cases() -> Iterator[Case]:
+    yield from rays.cases()
     yield from cases()
     yield from scaling()
     yield from triangles()

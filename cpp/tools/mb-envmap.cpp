@@ -12,7 +12,11 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -248,8 +252,17 @@ void write_border(const EnvMap& map, int border, Output output, bool json) {
   output.save(EnvMapView{layout, wide, map.channels}, json);
 }
 
-void print_samples(const EnvMap& map, const std::vector<std::vector<float>>& directions,
-                   const std::string& filter, bool json) {
+// The differentials of a square pixel that `degrees` of directions wide is, about a direction.
+std::pair<glm::vec3, glm::vec3> pixel_around(glm::vec3 direction, float degrees) {
+  const glm::vec3 axis =
+      std::abs(direction.y) < std::abs(direction.x) ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
+  const float width = 2.0F * std::tan(glm::radians(0.5F * degrees)) * glm::length(direction);
+  const glm::vec3 across = width * glm::normalize(glm::cross(direction, axis));
+  return {across, width * glm::normalize(glm::cross(direction, across))};
+}
+
+void print_samples(EnvMap map, const std::vector<std::vector<float>>& directions, SampleFilter filter,
+                   float footprint, bool json) {
   std::vector<glm::vec3> d;
   for (const std::vector<float>& v : directions) {
     if (v.size() != 3) {
@@ -258,10 +271,15 @@ void print_samples(const EnvMap& map, const std::vector<std::vector<float>>& dir
     }
     d.emplace_back(v[0], v[1], v[2]);
   }
-  const std::vector<glm::vec3> none(d.size(), glm::vec3(0.0F));
+  std::vector<glm::vec3> ddx(d.size(), glm::vec3(0.0F));
+  std::vector<glm::vec3> ddy = ddx;
+  if (filter == SampleFilter::trilinear || filter == SampleFilter::ewa) {
+    if (map.layout.levels == 1) map = build_mips(map, MipFilter::seamless);
+    for (std::size_t i = 0; i < d.size(); ++i) std::tie(ddx[i], ddy[i]) = pixel_around(d[i], footprint);
+  }
   const std::size_t channels = static_cast<std::size_t>(map.layout.channels);
   std::vector<float> values(d.size() * channels);
-  if (sample(map, d, none, none, {parse_sample_filter(filter)}, values) > 0) {
+  if (sample(map, d, ddx, ddy, {filter}, values) > 0) {
     throw InvalidArgument("--direction", "NaN, infinite or zero", "a finite vector of a length above 0");
   }
   for (std::size_t i = 0; i < d.size(); ++i) {
@@ -360,9 +378,15 @@ int run(int argc, char** argv) {
   sample_command->add_option("--direction", directions, "x y z, may be given several times")
       ->required()
       ->type_size(3);
-  sample_command->add_option("--filter", sample_filter, "nearest or bilinear")
+  sample_command
+      ->add_option("--filter", sample_filter,
+                   "How the map is read; the last two use its levels, made if it has one")
       ->capture_default_str()
-      ->check(CLI::IsMember({"nearest", "bilinear"}));
+      ->check(CLI::IsMember({"nearest", "bilinear", "trilinear", "ewa"}));
+  float footprint = 1.0F;
+  sample_command->add_option("--footprint", footprint, "trilinear and ewa: degrees that are averaged")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 179.0));
 
   Input first;
   Input second;
@@ -381,7 +405,8 @@ int run(int argc, char** argv) {
   if (*convert_command) convert.run(json);
   if (*mips_command) write_mips(mips_input.load(), parse_mip_filter(mip_filter), mips_output, json);
   if (*border_command) write_border(border_input.load(), border, border_output, json);
-  if (*sample_command) print_samples(sample_input.load(), directions, sample_filter, json);
+  if (*sample_command)
+    print_samples(sample_input.load(), directions, parse_sample_filter(sample_filter), footprint, json);
   if (*compare_command) {
     second.projection = first.projection;
     second.layout = first.layout;

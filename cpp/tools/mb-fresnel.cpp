@@ -1,4 +1,4 @@
-// mb-fresnel: Fresnel curves, tables and the report of what each approximation costs (spec F1 to F5).
+// mb-fresnel: Fresnel curves, plots, tables and the report of what each approximation costs (spec F1 to F5).
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -6,13 +6,16 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <numbers>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/image/atomic_file.hpp"
 #include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
 #include "mirrorbake/shading/fresnel_table.hpp"
@@ -96,6 +99,88 @@ void write_table(const Options& options) {
     save_image(options.out, image, PixelFormat::float32);
   }
   std::fprintf(stderr, "%zu entries, largest error %.3g\n", size, max_error);
+}
+
+// Plot --------------------------------------------------------------------------------------------------------------
+
+constexpr double kPlotWidth = 560, kPlotHeight = 360,
+                 kPlotMargin = 56;  // of the axes and around them, in pixels
+
+double plot_x(double degrees) { return kPlotMargin + kPlotWidth * degrees / 90.0; }
+double plot_y(double reflectance) { return kPlotMargin + kPlotHeight * (1.0 - reflectance); }
+
+template <typename... Values>
+std::string text(const char* format, Values... values) {
+  char buffer[256];
+  std::snprintf(buffer, sizeof buffer, format, values...);
+  return buffer;
+}
+
+std::string polyline(const ReflectanceFunction& curve, const char* style) {
+  std::string points;
+  for (int i = 0; i <= 360; ++i) {
+    const double degrees = 0.25 * i;
+    const double cosine = i == 360 ? 0.0 : std::cos(degrees * std::numbers::pi / 180.0);
+    points += text("%.2f,%.2f ", plot_x(degrees), plot_y(curve(cosine)));
+  }
+  return "<polyline fill=\"none\" " + std::string(style) + " points=\"" + points + "\"/>\n";
+}
+
+std::string axes(const std::string& title) {
+  std::string svg = "<g stroke=\"#ccc\">\n";
+  for (int degrees = 0; degrees <= 90; degrees += 15) {
+    svg += text("<path d=\"M%.1f %.1fV%.1f\"/>\n", plot_x(degrees), plot_y(0), plot_y(1));
+  }
+  for (int tenths = 0; tenths <= 10; tenths += 2) {
+    svg += text("<path d=\"M%.1f %.1fH%.1f\"/>\n", plot_x(0), plot_y(0.1 * tenths), plot_x(90));
+  }
+  svg += "</g>\n";
+  for (int degrees = 0; degrees <= 90; degrees += 15) {
+    svg += text("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">%d°</text>\n", plot_x(degrees),
+                plot_y(0) + 18, degrees);
+  }
+  for (int tenths = 0; tenths <= 10; tenths += 2) {
+    svg += text("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%.1f</text>\n", plot_x(0) - 6,
+                plot_y(0.1 * tenths) + 4, 0.1 * tenths);
+  }
+  svg += text("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">angle of incidence</text>\n", plot_x(45),
+              plot_y(0) + 38);
+  return svg + text("<text x=\"%.1f\" y=\"%.1f\">", plot_x(0), plot_y(1) - 16) + title + "</text>\n";
+}
+
+std::string title_of(const Options& options) {
+  if (options.model == "schlick") return text("Schlick, r0 = %g", options.r0);
+  if (options.model == "dielectric") return text("dielectric, n = %g", options.ior);
+  if (options.model == "conductor") return text("conductor, n = %g + %gi", options.eta, options.k);
+  return std::string(to_string(parse_metal(options.metal))) + ", illuminant " + options.illuminant;
+}
+
+// Reflectance over the angle of incidence; dashed, what Schlick's approximation makes of the value at 0°.
+void write_plot(const Options& options) {
+  const std::vector<ReflectanceFunction> curves = curves_of(options);
+  const std::vector<std::string> colours = curves.size() == 3
+                                               ? std::vector<std::string>{"#d33", "#2a2", "#36d"}
+                                               : std::vector<std::string>{"#333"};
+  std::string svg = text(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" font-family=\"sans-serif\" "
+      "font-size=\"13\">\n<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n",
+      kPlotWidth + 2 * kPlotMargin, kPlotHeight + 2 * kPlotMargin);
+  const bool with_schlick = options.model != "schlick";
+  svg += axes("Fresnel reflectance: " + title_of(options) + (with_schlick ? "; dashed: Schlick" : ""));
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    const std::string stroke = "stroke=\"" + colours[i] + "\" ";
+    svg += polyline(curves[i], (stroke + "stroke-width=\"2\"").c_str());
+    if (!with_schlick) continue;
+    const double r0 = curves[i](1.0);
+    svg += polyline([r0](double c) { return fresnel_schlick(c, r0); },
+                    (stroke + "stroke-dasharray=\"5 4\"").c_str());
+  }
+  svg += "</svg>\n";
+  if (options.out.empty()) {
+    std::fputs(svg.c_str(), stdout);
+  } else {
+    write_file(options.out, std::as_bytes(std::span(svg)));
+  }
 }
 
 void print_metal(const Options& options) {
@@ -223,9 +308,26 @@ void report(const Options& options) {
   if (options.json) std::printf("]}\n");
 }
 
+void add_curve_options(CLI::App& command, Options& options) {
+  command.add_option("--model", options.model, "Which curve")
+      ->check(CLI::IsMember({"schlick", "dielectric", "conductor", "metal"}))
+      ->capture_default_str();
+  command.add_option("--r0", options.r0, "schlick: reflectance at normal incidence, 0 to 1")
+      ->capture_default_str();
+  command.add_option("--ior", options.ior, "dielectric: relative index")->capture_default_str();
+  command.add_option("--eta", options.eta, "conductor: refractive index")->capture_default_str();
+  command.add_option("--k", options.k, "conductor: extinction coefficient")->capture_default_str();
+  command.add_option("--metal", options.metal, "metal: name or symbol; R, G, B clamped to [0,1]")
+      ->capture_default_str();
+  command.add_option("--illuminant", options.illuminant, "metal: light its colour is seen in")
+      ->check(CLI::IsMember({"D65", "E"}))
+      ->capture_default_str();
+}
+
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app("Fresnel curves, tables and the report of what each approximation costs.", "mb-fresnel");
+  CLI::App app("Fresnel curves, plots, tables and the report of what each approximation costs.",
+               "mb-fresnel");
   app.set_version_flag("--version", "mb-fresnel " MIRRORBAKE_VERSION);
   app.add_option("--threads", options.threads, "Threads, 0 for all cores")
       ->capture_default_str()
@@ -235,19 +337,7 @@ int run(int argc, char** argv) {
 
   CLI::App* table =
       app.add_subcommand("table", "A curve at equal steps of the cosine: CSV to stdout, or an image");
-  table->add_option("--model", options.model, "Which curve")
-      ->check(CLI::IsMember({"schlick", "dielectric", "conductor", "metal"}))
-      ->capture_default_str();
-  table->add_option("--r0", options.r0, "schlick: reflectance at normal incidence, 0 to 1")
-      ->capture_default_str();
-  table->add_option("--ior", options.ior, "dielectric: relative index")->capture_default_str();
-  table->add_option("--eta", options.eta, "conductor: refractive index")->capture_default_str();
-  table->add_option("--k", options.k, "conductor: extinction coefficient")->capture_default_str();
-  table->add_option("--metal", options.metal, "metal: name or symbol; R, G, B clamped to [0,1]")
-      ->capture_default_str();
-  table->add_option("--illuminant", options.illuminant, "metal: light its colour is seen in")
-      ->check(CLI::IsMember({"D65", "E"}))
-      ->capture_default_str();
+  add_curve_options(*table, options);
   table->add_option("--size", options.size, "Entries; 0 for as few as --max-error allows")
       ->check(CLI::Range(0, 65536))
       ->capture_default_str();
@@ -255,6 +345,11 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   table->add_option("-o,--out", options.out, "Image of size × 1 pixels, float32 (.exr, .tif) instead of CSV");
   table->callback([&] { write_table(options); });
+
+  CLI::App* plot = app.add_subcommand("plot", "A curve over the angle of incidence, beside Schlick's: SVG");
+  add_curve_options(*plot, options);
+  plot->add_option("-o,--out", options.out, "File (.svg) instead of stdout");
+  plot->callback([&] { write_plot(options); });
 
   CLI::App* metal =
       app.add_subcommand("metal", "Colour of a metal from its measured spectrum, and models fitted to it");

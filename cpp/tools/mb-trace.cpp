@@ -36,6 +36,17 @@ namespace {
 using namespace mirrorbake;        // NOLINT(google-build-using-namespace): one program, one namespace
 using namespace mirrorbake::tool;  // NOLINT(google-build-using-namespace)
 
+// CLI11 takes -1 for the largest number, and what is beyond that as well.
+CLI::Validator whole_number() {
+  return {[](const std::string& text) {
+            std::uint64_t value = 0;
+            const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+            const bool is_whole = error == std::errc() && end == text.data() + text.size();
+            return is_whole ? std::string() : text + " is not a whole number from 0 to 18446744073709551615";
+          },
+          "UINT", "whole number"};
+}
+
 // Whole numbers in `text`, separated by any of `separators`; nothing if it is anything else.
 std::optional<std::vector<int>> parse_numbers(const std::string& text, std::string_view separators) {
   std::vector<int> numbers;
@@ -154,7 +165,7 @@ struct Request {
     app.add_option("--depth", depth, "bounces after the first, specular and diffuse")
         ->capture_default_str()
         ->check(CLI::Range(0, 64));
-    app.add_option("--seed", seed, "of the random numbers")->capture_default_str();
+    app.add_option("--seed", seed, "of the random numbers")->capture_default_str()->check(whole_number());
     app.add_option("--indirect", indirect,
                    "diffuse light by way of other surfaces: path (unbiased), cached (smooth) or none")
         ->capture_default_str()

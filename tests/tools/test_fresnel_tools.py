@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -53,6 +54,29 @@ def test_study_prints_tables_and_rejects_nonsense() -> None:
     wrong = study("--samples", "10", "--max-error", "0")
     assert wrong.returncode == 3
     assert "max_error is 0" in wrong.stderr
+
+
+def test_tool_plots_curves_over_the_angle(tool: str, tmp_path: Path) -> None:
+    """Points of the curves, read back from the picture, are the functions' values."""
+    path = tmp_path / "glass.svg"
+    assert run(tool, "plot", "--ior", "1.5", "-o", path).returncode == 0
+    root = ElementTree.parse(path).getroot()
+    curves = root.findall("{http://www.w3.org/2000/svg}polyline")
+    degrees = np.arange(361) / 4
+    cosines = np.cos(np.radians(degrees))
+    assert len(curves) == 2
+    for curve, expected in zip(
+        curves, (fresnel.dielectric(cosines, 1.5), fresnel.schlick(cosines, 0.04)), strict=True
+    ):
+        x, y = np.array([point.split(",") for point in curve.attrib["points"].split()], float).T
+        reflectance = 1 - (y - y[-1]) / 360.0  # the curves end at 1, with 360 pixels from 0 to 1
+        np.testing.assert_allclose(reflectance, expected, atol=1e-4)
+        np.testing.assert_allclose(np.diff(x), np.diff(x)[0], atol=0.02)
+    gold = run(tool, "plot", "--model", "metal", "--metal", "Au")
+    assert gold.stdout.count("<polyline") == 6
+    wrong = run(tool, "plot", "--ior", "-1", "-o", tmp_path / "wrong.svg")
+    assert wrong.returncode == 3
+    assert not (tmp_path / "wrong.svg").exists()
 
 
 def test_tool_prints_the_table_as_csv(tool: str) -> None:

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import math
 import shutil
 import subprocess
 from pathlib import Path
@@ -103,6 +104,22 @@ def test_mips_border_and_sample(panorama: Path, tmp_path: Path) -> None:
     line = json.loads(mb_envmap("sample", tmp_path / "cube.ktx2", "--direction", 0, 2, 0, "--json"))
     expected = EnvMap.load(tmp_path / "cube.ktx2").sample([0.0, 2.0, 0.0])
     assert line["value"] == pytest.approx(expected)
+
+
+def test_samples_over_a_footprint_use_the_levels(panorama: Path, tmp_path: Path) -> None:
+    """As EnvMap.sample with the differentials of a square pixel of so many degrees."""
+    mb_envmap("convert", panorama, "--to", "cube", "--size", 16, "-o", tmp_path / "cube.exr")
+    mb_envmap("mips", tmp_path / "cube.exr", "-o", tmp_path / "cube.ktx2", "--format", "float32")
+    levels = EnvMap.load(tmp_path / "cube.ktx2")
+    width = 2 * 2 * math.tan(math.radians(10))
+    for name in ("trilinear", "ewa"):
+        expected = levels.sample([0, 2, 0], filter=name, ddx=[0, 0, -width], ddy=[width, 0, 0])
+        for file in ("cube.ktx2", "cube.exr"):  # of one level: the others are made
+            arguments = ("--filter", name, "--footprint", 20, "--direction", 0, 2, 0, "--json")
+            line = json.loads(mb_envmap("sample", tmp_path / file, *arguments))
+            assert line["value"] == pytest.approx(np.ravel(expected).tolist(), rel=2e-3), file
+    sharp = json.loads(mb_envmap("sample", tmp_path / "cube.exr", "--direction", 0, 2, 0, "--json"))
+    assert line["value"] != pytest.approx(sharp["value"], rel=1e-2)
 
 
 def test_compare_finds_no_difference_and_a_known_one(panorama: Path, tmp_path: Path) -> None:

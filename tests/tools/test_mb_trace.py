@@ -190,7 +190,14 @@ def test_outputs_are_checked_before_tracing(tmp_path: Path) -> None:
 
 
 def test_numbers_out_of_range_are_wrong_usage(scene: Path, tmp_path: Path) -> None:
-    for option, value in (("--spp", 0), ("--spp", 65537), ("--depth", -1), ("--depth", 65)):
+    for option, value in (
+        ("--spp", 0),
+        ("--spp", 65537),
+        ("--depth", -1),
+        ("--depth", 65),
+        ("--seed", -1),
+        ("--seed", 2**64),
+    ):
         assert option in mb_trace("beauty", scene, "-o", tmp_path / "a.exr", option, value, status=2)
     assert "--crop" in mb_trace("beauty", scene, "-o", tmp_path / "a.exr", "--crop", "0x0+0+0", status=3)
     far = ["--eye", 1e30, 0, 0]

@@ -13,6 +13,7 @@
 
 #include "bind.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/scene/load.hpp"
 #include "mirrorbake/scene/room.hpp"
 #include "mirrorbake/scene/scene.hpp"
@@ -186,11 +187,8 @@ void bind_texture(nb::module_& m) {
           },
           nb::arg("other"))
       .def("__repr__", [](const TextureReference& r) {
-        const auto pair = [](glm::vec2 v) {
-          return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ")";
-        };
-        return "TextureReference(" + std::to_string(r.texture) + ", offset=" + pair(r.offset) +
-               ", scale=" + pair(r.scale) + ", rotation=" + std::to_string(r.rotation) + ")";
+        return "TextureReference(" + std::to_string(r.texture) + ", offset=" + text_of(r.offset) +
+               ", scale=" + text_of(r.scale) + ", rotation=" + text_of(r.rotation) + ")";
       });
 }
 

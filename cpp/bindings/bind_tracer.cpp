@@ -10,6 +10,7 @@
 
 #include "bind.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
 
 namespace mirrorbake::bindings {
@@ -98,11 +99,8 @@ void bind_tracer(nb::module_& m) {
           "__eq__", [](const Camera& a, const Camera& b) { return a == b; }, nb::is_operator(),
           nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__repr__", [](const Camera& c) {
-        const auto text = [](glm::vec3 v) {
-          return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
-        };
-        return "Camera(eye=" + text(c.eye) + ", target=" + text(c.target) + ", up=" + text(c.up) +
-               ", vertical_fov_degrees=" + std::to_string(c.vertical_fov_degrees) +
+        return "Camera(eye=" + text_of(c.eye) + ", target=" + text_of(c.target) + ", up=" + text_of(c.up) +
+               ", vertical_fov_degrees=" + text_of(c.vertical_fov_degrees) +
                ", width=" + std::to_string(c.width) + ", height=" + std::to_string(c.height) + ")";
       });
 

@@ -104,7 +104,7 @@ def test_scene_holds_what_is_added() -> None:
     assert (back.lobe, back.roughness, back.exponent) == (_core.SpecularLobe.ggx, 0.25, 20.0)
     assert back.roughness_texture.texture == texture
     assert back.emission_texture.offset == (0.25, 0.5)
-    assert repr(back.roughness_texture).startswith("TextureReference(0, offset=(0.0")
+    assert repr(back.roughness_texture).startswith("TextureReference(0, offset=(0, ")
     back.fresnel = _core.Fresnel(_core.FresnelModel.conductor, eta=(0.2, 0.9, 1.1), k=(3.9, 2.4, 2.2))
     scene.set_material(0, back)
     assert scene.material(0).fresnel.model == _core.FresnelModel.conductor

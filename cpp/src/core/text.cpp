@@ -1,5 +1,6 @@
 #include "mirrorbake/core/text.hpp"
 
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 
@@ -23,7 +24,23 @@ std::size_t sequence_length(std::string_view text) {
   return length;
 }
 
+template <typename Real>
+std::string shortest(Real number) {
+  char digits[32];
+  return {digits, std::to_chars(digits, digits + sizeof digits, number).ptr};
+}
+
 }  // namespace
+
+std::string text_of(float number) { return shortest(number); }
+std::string text_of(double number) { return shortest(number); }
+std::string text_of(glm::vec2 v) { return "(" + text_of(v.x) + ", " + text_of(v.y) + ")"; }
+std::string text_of(glm::vec3 v) {
+  return "(" + text_of(v.x) + ", " + text_of(v.y) + ", " + text_of(v.z) + ")";
+}
+std::string text_of(const glm::dvec3& v) {
+  return "(" + text_of(v.x) + ", " + text_of(v.y) + ", " + text_of(v.z) + ")";
+}
 
 std::string valid_utf8(std::string_view text) {
   std::string valid;

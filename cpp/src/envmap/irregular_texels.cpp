@@ -445,18 +445,18 @@ void IrregularTexels::unroll_outline() {
   std::rotate(outline_.begin(), start, outline_.end());
   outline_.push_back(outline_.front());
   double x = outline_.front().x;
-  std::optional<double> pole;
+  bool after_pole = false;
   double sum = 0.0;
   for (const glm::dvec2 p : outline_) {
     sum += p.y;
     if (is_pole(p)) {
-      pole = p.y;
+      after_pole = true;
       polygon_.push_back({x, p.y});
       continue;
     }
     x = unrolled(p.x, x);
-    if (pole) polygon_.push_back({x, *pole});
-    pole.reset();
+    if (after_pole) polygon_.push_back({x, polygon_.back().y});
+    after_pole = false;
     polygon_.push_back({x, p.y});
   }
   const double begin = polygon_.front().x;

@@ -14,6 +14,7 @@
 #include "line_lookup.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/envmap/texel_lookup.hpp"
 
 namespace mirrorbake {
@@ -268,7 +269,7 @@ std::size_t sample(const EnvMapView& map, std::span<const glm::vec3> directions,
                           std::to_string(directions.size()) + " differentials each");
   }
   if (!(options.max_anisotropy >= 1.0)) {
-    throw InvalidArgument("max_anisotropy", std::to_string(options.max_anisotropy), "at least 1");
+    throw InvalidArgument("max_anisotropy", text_of(options.max_anisotropy), "at least 1");
   }
   std::atomic<std::size_t> unusable{0};
   const PositionLoop positions =

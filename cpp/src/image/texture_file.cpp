@@ -13,6 +13,7 @@
 
 #include "image_files.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/image/color.hpp"
 
 namespace mirrorbake {
@@ -204,7 +205,7 @@ void TextureFile::State::check_texels(const ImageLimits& limits, Transfer transf
       const int channel = static_cast<int>(i % static_cast<std::size_t>(spec.nchannels));
       if (channel >= channels) continue;
       if (!(strip[i] >= 0.0F && strip[i] <= 1.0F)) {
-        throw FileError(path, "has the value " + std::to_string(strip[i]) + ", expected 0 to 1");
+        throw FileError(path, "has the value " + text_of(strip[i]) + ", expected 0 to 1");
       }
       sums[channel] += static_cast<double>(is_srgb ? srgb_decode(strip[i]) : strip[i]);
     }

@@ -10,6 +10,7 @@
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "pyramid_fill.hpp"
 #include "regulariser.hpp"
 #include "texel_vector.hpp"
@@ -35,14 +36,13 @@ void check_length(const char* name, std::size_t length, std::size_t expected) {
 
 void check(const SolveOptions& options) {
   const auto check_weight = [](const char* name, float value) {
-    if (!(value >= 0.0F && std::isfinite(value)))
-      throw InvalidArgument(name, std::to_string(value), "a number ≥ 0");
+    if (!(value >= 0.0F && std::isfinite(value))) throw InvalidArgument(name, text_of(value), "a number ≥ 0");
   };
   check_weight("smoothness", options.smoothness);
   check_weight("level_agreement", options.level_agreement);
   check_weight("prior_weight", options.prior_weight);
   if (!(options.tolerance > 0.0F))
-    throw InvalidArgument("tolerance", std::to_string(options.tolerance), "a number > 0");
+    throw InvalidArgument("tolerance", text_of(options.tolerance), "a number > 0");
   if (options.max_iterations < 0 || options.max_iterations > 100000) {
     throw InvalidArgument("max_iterations", std::to_string(options.max_iterations), "0 to 100000");
   }

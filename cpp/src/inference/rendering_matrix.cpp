@@ -6,6 +6,7 @@
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -132,8 +133,7 @@ RenderingMatrix build_rendering_matrix(const SurfaceSamples& samples, const Samp
   check_lengths(samples);
   validate(proxy);
   if (!(options.footprint_scale > 0.0F) || options.footprint_scale > 1024.0F) {
-    throw InvalidArgument("footprint_scale", std::to_string(options.footprint_scale),
-                          "a number in (0, 1024]");
+    throw InvalidArgument("footprint_scale", text_of(options.footprint_scale), "a number in (0, 1024]");
   }
   const RowSamples groups = group_by_pixel(samples, selection);
   const std::size_t rows = groups.offsets.size() - 1;

@@ -12,6 +12,7 @@
 #include "finite_direction.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/projection/cube.hpp"
 #include "mirrorbake/projection/dual_paraboloid.hpp"
 #include "mirrorbake/projection/fisheye.hpp"
@@ -72,7 +73,7 @@ std::string to_string(const Projection& projection) {
 void validate(const Projection& projection) {
   if (projection.kind != ProjectionKind::fisheye) return;
   if (!(projection.field_of_view > 0.0F && projection.field_of_view <= 360.0F)) {
-    throw InvalidArgument("field_of_view", std::to_string(projection.field_of_view),
+    throw InvalidArgument("field_of_view", text_of(projection.field_of_view),
                           "above 0 and up to 360 degrees");
   }
 }

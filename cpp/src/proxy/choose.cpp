@@ -13,10 +13,11 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "is_finite.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/proxy/fit.hpp"
-#include "vec_text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -324,23 +325,22 @@ void check(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOptions& o
   }
   constexpr std::size_t kMinRays = 16;
   if (n < kMinRays) throw InvalidArgument("rays", std::to_string(n), "at least 16");
-  if (!detail::is_finite(origin))
-    throw InvalidArgument("origin", detail::vec_text(origin), "finite coordinates");
+  if (!detail::is_finite(origin)) throw InvalidArgument("origin", text_of(origin), "finite coordinates");
   for (std::size_t i = 0; i < n; ++i) {
     const std::string index = "[" + std::to_string(i) + "]";
     if (!detail::is_finite(rays.positions[i])) {
-      throw InvalidArgument("positions" + index, detail::vec_text(rays.positions[i]), "finite coordinates");
+      throw InvalidArgument("positions" + index, text_of(rays.positions[i]), "finite coordinates");
     }
     if (!detail::is_finite(rays.directions[i]) || rays.directions[i] == glm::vec3(0.0F)) {
-      throw InvalidArgument("directions" + index, detail::vec_text(rays.directions[i]), "a length > 0");
+      throw InvalidArgument("directions" + index, text_of(rays.directions[i]), "a length > 0");
     }
     if (!(rays.distances[i] > 0)) {
       throw InvalidArgument("distances" + index, std::to_string(rays.distances[i]), "a distance > 0");
     }
   }
-  if (!(options.tolerance >= 0)) throw InvalidArgument("tolerance", std::to_string(options.tolerance), "≥ 0");
+  if (!(options.tolerance >= 0)) throw InvalidArgument("tolerance", text_of(options.tolerance), "≥ 0");
   if (!(options.negligible_angle >= 0)) {
-    throw InvalidArgument("negligible_angle", std::to_string(options.negligible_angle), "≥ 0");
+    throw InvalidArgument("negligible_angle", text_of(options.negligible_angle), "≥ 0");
   }
   if (options.max_rays_per_view < kMinRays) {
     throw InvalidArgument("max_rays_per_view", std::to_string(options.max_rays_per_view), "at least 16");

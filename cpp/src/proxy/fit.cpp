@@ -9,8 +9,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "is_finite.hpp"
 #include "mirrorbake/core/error.hpp"
-#include "vec_text.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -19,14 +20,14 @@ void check_points(const char* name, std::span<const glm::vec3> points) {
   if (points.empty()) throw InvalidArgument(name, "empty", "at least one point");
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!detail::is_finite(points[i])) {
-      throw InvalidArgument(std::string(name) + "[" + std::to_string(i) + "]", detail::vec_text(points[i]),
+      throw InvalidArgument(std::string(name) + "[" + std::to_string(i) + "]", text_of(points[i]),
                             "finite coordinates");
     }
   }
 }
 
 void check_point(const char* name, glm::vec3 point) {
-  if (!detail::is_finite(point)) throw InvalidArgument(name, detail::vec_text(point), "finite coordinates");
+  if (!detail::is_finite(point)) throw InvalidArgument(name, text_of(point), "finite coordinates");
 }
 
 float round_up(double value) {
@@ -136,8 +137,7 @@ std::vector<glm::dvec3> hits_from(std::span<const glm::vec3> hits, glm::vec3 ori
     if (d != glm::dvec3(0.0)) relative.push_back(d);
   }
   if (relative.empty()) {
-    throw InvalidArgument("hits", "all at the origin " + detail::vec_text(origin),
-                          "points around the origin");
+    throw InvalidArgument("hits", "all at the origin " + text_of(origin), "points around the origin");
   }
   return relative;
 }
@@ -277,8 +277,7 @@ Ellipsoid fit_ellipsoid(std::span<const glm::vec3> points, glm::vec3 centre) {
   for (const glm::vec3& point : points) extent = glm::max(extent, glm::abs(glm::dvec3(point) - c));
   const double largest = std::max({extent.x, extent.y, extent.z});
   if (!(largest > 0)) {
-    throw InvalidArgument("points", "all at the centre " + detail::vec_text(centre),
-                          "points around the centre");
+    throw InvalidArgument("points", "all at the centre " + text_of(centre), "points around the centre");
   }
   // In units of the extents, which makes the problem well conditioned: w lies in [1/3, 1] where it matters.
   // The least thickness is a constraint like the points': an imaginary point on each axis.
@@ -322,7 +321,7 @@ Ellipsoid fit_ellipsoid(std::span<const glm::vec3> points, glm::vec3 centre) {
   worst_value = std::max(worst_value, most_violated(w).second);
   if (worst_value > 1.0 + 1e-7) {
     throw NumericalError("fit_ellipsoid: no convergence, a point is outside by " +
-                         std::to_string(worst_value - 1.0));
+                         text_of(worst_value - 1.0));
   }
   const double scale = std::sqrt(std::max(worst_value, 1.0)) * (1.0 + 1e-14);
   Ellipsoid ellipsoid;
@@ -335,8 +334,7 @@ Ellipsoid fit_ellipsoid(std::span<const glm::vec3> points, glm::vec3 centre) {
 Box fit_box_mean_distance(std::span<const glm::vec3> hits, glm::vec3 origin, float floor) {
   const std::vector<glm::dvec3> relative = hits_from(hits, origin);
   if (!std::isfinite(floor) || !(floor < origin.y)) {
-    throw InvalidArgument("floor", std::to_string(floor),
-                          "a height below the origin's, " + std::to_string(origin.y));
+    throw InvalidArgument("floor", text_of(floor), "a height below the origin's, " + text_of(origin.y));
   }
   Sides sides{};
   const auto distances = distances_by_side(relative);

@@ -7,9 +7,10 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "is_finite.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
-#include "vec_text.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 void check_finite(const char* name, std::span<const glm::vec3> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!detail::is_finite(points[i])) {
-      throw InvalidArgument(std::string(name) + "[" + std::to_string(i) + "]", detail::vec_text(points[i]),
+      throw InvalidArgument(std::string(name) + "[" + std::to_string(i) + "]", text_of(points[i]),
                             "finite coordinates");
     }
   }
@@ -46,7 +47,7 @@ std::vector<std::uint8_t> hull_triangles(std::span<const glm::vec3> positions,
                                          std::span<const glm::vec3> extremes, double tolerance) {
   check_finite("positions", positions);
   check_finite("extremes", extremes);
-  if (!(tolerance >= 0)) throw InvalidArgument("tolerance", std::to_string(tolerance), "≥ 0");
+  if (!(tolerance >= 0)) throw InvalidArgument("tolerance", text_of(tolerance), "≥ 0");
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     const unsigned largest = std::max({triangles[i].x, triangles[i].y, triangles[i].z});
     if (largest >= positions.size()) {

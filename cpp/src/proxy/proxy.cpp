@@ -8,8 +8,9 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "is_finite.hpp"
 #include "mirrorbake/core/error.hpp"
-#include "vec_text.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -17,12 +18,12 @@ namespace {
 constexpr float kAxesTolerance = 1e-4F;
 
 void check_finite(const char* name, glm::vec3 v) {
-  if (!detail::is_finite(v)) throw InvalidArgument(name, detail::vec_text(v), "finite coordinates");
+  if (!detail::is_finite(v)) throw InvalidArgument(name, text_of(v), "finite coordinates");
 }
 
 void check_extent(const char* name, glm::vec3 v) {
   if (!detail::is_finite(v) || !(v.x > 0 && v.y > 0 && v.z > 0)) {
-    throw InvalidArgument(name, detail::vec_text(v), "positive and finite");
+    throw InvalidArgument(name, text_of(v), "positive and finite");
   }
 }
 
@@ -33,8 +34,7 @@ void check_axes(const char* name, const glm::mat3& m) {
     for (int j = 0; j < 3; ++j) {
       if (!(std::abs(product[i][j] - (i == j ? 1.0F : 0.0F)) <= kAxesTolerance)) {
         throw InvalidArgument(name,
-                              detail::vec_text(m[0]) + ", " + detail::vec_text(m[1]) + ", " +
-                                  detail::vec_text(m[2]) + " (columns)",
+                              text_of(m[0]) + ", " + text_of(m[1]) + ", " + text_of(m[2]) + " (columns)",
                               "an orthonormal matrix");
       }
     }
@@ -88,8 +88,7 @@ void validate(const Proxy& proxy) {
         check_shape(shape);
         if constexpr (!std::is_same_v<std::decay_t<decltype(shape)>, InfiniteSphere>) {
           if (!(gauge(shape, proxy.origin) < 1.0)) {
-            throw InvalidArgument("proxy origin", detail::vec_text(proxy.origin),
-                                  "a point inside of the shape");
+            throw InvalidArgument("proxy origin", text_of(proxy.origin), "a point inside of the shape");
           }
         }
       },

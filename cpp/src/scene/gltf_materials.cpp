@@ -11,6 +11,7 @@
 
 #include "file_bytes.hpp"
 #include "gltf_document.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake::gltf {
 namespace {
@@ -49,7 +50,7 @@ const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const
 
 double unit_factor(const std::string& path, const std::string& what, double value) {
   if (!(value >= 0.0 && value <= 1.0)) {
-    fail(path, what + " is " + std::to_string(value) + ", expected 0 to 1");
+    fail(path, what + " is " + text_of(value) + ", expected 0 to 1");
   }
   return value;
 }
@@ -250,8 +251,7 @@ MaterialReader::Parameters MaterialReader::parameters(const tinygltf::Material& 
   if (const tinygltf::Value* ior = extension(material.extensions, "KHR_materials_ior")) {
     const double n = number_property(path_, *ior, "ior", 1.5, where + "KHR_materials_ior");
     // 0 stands for an infinite index.
-    if (n != 0.0 && !(n >= 1.0))
-      fail(path_, where + "ior is " + std::to_string(n) + ", expected 0 or at least 1");
+    if (n != 0.0 && !(n >= 1.0)) fail(path_, where + "ior is " + text_of(n) + ", expected 0 or at least 1");
     p.dielectric_r0 = n == 0.0 ? 1.0F : static_cast<float>(std::pow((n - 1.0) / (n + 1.0), 2));
   }
   const auto& base = pbr.baseColorTexture;
@@ -310,19 +310,19 @@ void MaterialReader::set_colours(const Parameters& p, Material& result) {
   };
   const auto metallic_at = [&](glm::vec3 mr) { return varying ? metallic * mr.z : metallic; };
   result.albedo = p.base;
-  result.albedo_texture = made_texture(placed, "albedo " + sources + " " + std::to_string(metallic), [&] {
+  result.albedo_texture = made_texture(placed, "albedo " + sources + " " + text_of(metallic), [&] {
     return make(base ? 3 : 1, [&](glm::vec3 b, glm::vec3 mr) { return b * (1.0F - metallic_at(mr)); });
   });
   result.fresnel.r0 = glm::vec3(1.0F);
-  result.specular_texture = made_texture(
-      placed,
-      "specular " + sources + " " + std::to_string(metallic) + " " + std::to_string(p.dielectric_r0) + " " +
-          std::to_string(p.base.x) + " " + std::to_string(p.base.y) + " " + std::to_string(p.base.z),
-      [&] {
-        return make(3, [&](glm::vec3 b, glm::vec3 mr) {
-          return glm::mix(glm::vec3(p.dielectric_r0), p.base * b, metallic_at(mr));
-        });
-      });
+  result.specular_texture =
+      made_texture(placed,
+                   "specular " + sources + " " + text_of(metallic) + " " + text_of(p.dielectric_r0) + " " +
+                       text_of(p.base),
+                   [&] {
+                     return make(3, [&](glm::vec3 b, glm::vec3 mr) {
+                       return glm::mix(glm::vec3(p.dielectric_r0), p.base * b, metallic_at(mr));
+                     });
+                   });
   if (base_image) reader_.release(*base_image);
   if (mr_image) reader_.release(*mr_image);
 }
@@ -353,7 +353,7 @@ void MaterialReader::set_opacity(const tinygltf::Material& material, const Param
   if (material.alphaMode.empty() || material.alphaMode == "OPAQUE") return;
   if (material.alphaMode == "MASK") {
     if (!(material.alphaCutoff >= 0.0)) {
-      fail(path_, where + "alphaCutoff is " + std::to_string(material.alphaCutoff) + ", expected at least 0");
+      fail(path_, where + "alphaCutoff is " + text_of(material.alphaCutoff) + ", expected at least 0");
     }
     result.opacity_cutoff =
         static_cast<float>(std::min(material.alphaCutoff, double{std::numeric_limits<float>::max()}));

@@ -14,6 +14,7 @@
 #include "gltf_mesh.hpp"
 #include "gltf_nodes.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "scene_builder.hpp"
 
 namespace mirrorbake {
@@ -100,7 +101,7 @@ class GltfScene {
     }
     const double fov = source.perspective.yfov;
     if (!(fov > 0.0 && fov < std::numbers::pi)) {
-      fail(path_, "camera " + std::to_string(node.camera) + " yfov is " + std::to_string(fov) +
+      fail(path_, "camera " + std::to_string(node.camera) + " yfov is " + text_of(fov) +
                       ", expected an angle in (0, π)");
     }
     SceneCamera camera;
@@ -143,7 +144,7 @@ class GltfScene {
       const double inner = light.spot.innerConeAngle;
       const double outer = light.spot.outerConeAngle;
       if (!(inner >= 0.0 && inner < outer && outer <= 0.5 * std::numbers::pi + 1e-6)) {
-        fail(path_, where + "cone angles are " + std::to_string(inner) + " and " + std::to_string(outer) +
+        fail(path_, where + "cone angles are " + text_of(inner) + " and " + text_of(outer) +
                         ", expected 0 ≤ inner < outer ≤ π/2");
       }
       const float outer_degrees = std::min(degrees(outer), 90.0F);

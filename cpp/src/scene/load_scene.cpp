@@ -1,4 +1,5 @@
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/scene/load.hpp"
 #include "scene_builder.hpp"
 
@@ -10,7 +11,7 @@ void check_options(const SceneOptions& options) {
     throw InvalidArgument("max_texture_side", std::to_string(options.max_texture_side), "1 to 65536");
   }
   if (!(options.luminous_efficacy >= 1e-6F && options.luminous_efficacy <= 1e6F)) {
-    throw InvalidArgument("luminous_efficacy", std::to_string(options.luminous_efficacy), "1e-6 to 1e6");
+    throw InvalidArgument("luminous_efficacy", text_of(options.luminous_efficacy), "1e-6 to 1e6");
   }
 }
 

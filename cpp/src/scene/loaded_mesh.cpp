@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -48,9 +49,8 @@ void check_positions(const std::string& path, const std::vector<glm::vec3>& posi
     const glm::vec3 p = positions[i];
     const float largest = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
     if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && largest <= kMaxCoordinate) continue;
-    throw FileError(path, "vertex " + std::to_string(i) + " is (" + std::to_string(p.x) + ", " +
-                              std::to_string(p.y) + ", " + std::to_string(p.z) +
-                              "), expected finite coordinates up to 1e12");
+    throw FileError(path, "vertex " + std::to_string(i) + " is " + text_of(p) +
+                              ", expected finite coordinates up to 1e12");
   }
 }
 

@@ -10,6 +10,7 @@
 #include <glm/trigonometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -18,10 +19,6 @@ namespace {
 constexpr float kMaxCoordinate = 1e12F;
 // How far from 1 the length of a vertex normal may be: normals stored as 8-bit integers pass.
 constexpr float kNormalTolerance = 1e-2F;
-
-std::string text(float v) { return std::to_string(v); }
-std::string text(glm::vec2 v) { return "(" + text(v.x) + ", " + text(v.y) + ")"; }
-std::string text(glm::vec3 v) { return "(" + text(v.x) + ", " + text(v.y) + ", " + text(v.z) + ")"; }
 
 bool is_finite(float v) { return std::isfinite(v); }
 bool is_finite(glm::vec2 v) { return std::isfinite(v.x) && std::isfinite(v.y); }
@@ -73,7 +70,7 @@ void check_texels(const std::string& where, const Image& image, float maximum, s
     const std::size_t width = static_cast<std::size_t>(image.width);
     throw InvalidArgument(where + " pixel (" + std::to_string(pixel % width) + ", " +
                               std::to_string(pixel / width) + ") channel " + std::to_string(i % 3),
-                          text(v), expected);
+                          text_of(v), expected);
   }
 }
 
@@ -84,18 +81,18 @@ void check_reference(const Scene& scene, const std::string& where, const Texture
   }
   if (!is_finite(reference.offset) || !is_finite(reference.scale) || !is_finite(reference.rotation)) {
     throw InvalidArgument(where + " transform",
-                          "offset " + text(reference.offset) + ", scale " + text(reference.scale) +
-                              ", rotation " + text(reference.rotation),
+                          "offset " + text_of(reference.offset) + ", scale " + text_of(reference.scale) +
+                              ", rotation " + text_of(reference.rotation),
                           "finite values");
   }
 }
 
 void check_opacity(const Scene& scene, const std::string& where, const Material& material) {
   if (!(material.opacity >= 0.0F && material.opacity <= 1.0F)) {
-    throw InvalidArgument(where + " opacity", text(material.opacity), "a value in [0, 1]");
+    throw InvalidArgument(where + " opacity", text_of(material.opacity), "a value in [0, 1]");
   }
   if (material.opacity_cutoff && !(*material.opacity_cutoff >= 0.0F && is_finite(*material.opacity_cutoff))) {
-    throw InvalidArgument(where + " opacity_cutoff", text(*material.opacity_cutoff),
+    throw InvalidArgument(where + " opacity_cutoff", text_of(*material.opacity_cutoff),
                           "a finite value of at least 0");
   }
   check_reference(scene, where + " opacity_texture", material.opacity_texture);
@@ -109,11 +106,11 @@ void check_material(const Scene& scene, std::size_t index) {
   const Material& material = scene.materials[index];
   const std::string where = label("material", index, material.name);
   if (!in_unit_interval(material.albedo)) {
-    throw InvalidArgument(where + " albedo", text(material.albedo), "values in [0, 1]");
+    throw InvalidArgument(where + " albedo", text_of(material.albedo), "values in [0, 1]");
   }
   check_reference(scene, where + " albedo_texture", material.albedo_texture);
   if (!is_finite_nonnegative(material.emission)) {
-    throw InvalidArgument(where + " emission", text(material.emission), "finite values of at least 0");
+    throw InvalidArgument(where + " emission", text_of(material.emission), "finite values of at least 0");
   }
   check_reference(scene, where + " emission_texture", material.emission_texture);
   check_opacity(scene, where, material);
@@ -121,27 +118,27 @@ void check_material(const Scene& scene, std::size_t index) {
   check_reference(scene, where + " specular_texture", material.specular_texture);
   check_reference(scene, where + " roughness_texture", material.roughness_texture);
   if (material.lobe == SpecularLobe::ggx && !(material.roughness > 0.0F && material.roughness <= 1.0F)) {
-    throw InvalidArgument(where + " roughness", text(material.roughness), "a value in (0, 1]");
+    throw InvalidArgument(where + " roughness", text_of(material.roughness), "a value in (0, 1]");
   }
   if (material.lobe == SpecularLobe::phong && !(material.exponent >= 1.0F && material.exponent <= 1e6F)) {
-    throw InvalidArgument(where + " exponent", text(material.exponent), "a value in [1, 1e6]");
+    throw InvalidArgument(where + " exponent", text_of(material.exponent), "a value in [1, 1e6]");
   }
   const Fresnel& fresnel = material.fresnel;
   switch (fresnel.model) {
     case FresnelModel::constant:
     case FresnelModel::schlick:
       if (!in_unit_interval(fresnel.r0)) {
-        throw InvalidArgument(where + " fresnel r0", text(fresnel.r0), "values in [0, 1]");
+        throw InvalidArgument(where + " fresnel r0", text_of(fresnel.r0), "values in [0, 1]");
       }
       break;
     case FresnelModel::conductor:
       if (!is_finite_nonnegative(fresnel.k)) {
-        throw InvalidArgument(where + " fresnel k", text(fresnel.k), "finite values of at least 0");
+        throw InvalidArgument(where + " fresnel k", text_of(fresnel.k), "finite values of at least 0");
       }
       [[fallthrough]];
     case FresnelModel::dielectric:
       if (!is_finite_positive(fresnel.eta)) {
-        throw InvalidArgument(where + " fresnel eta", text(fresnel.eta), "finite values above 0");
+        throw InvalidArgument(where + " fresnel eta", text_of(fresnel.eta), "finite values above 0");
       }
       break;
   }
@@ -162,7 +159,8 @@ void check_mesh(const std::string& where, const TriangleMesh& mesh, std::size_t 
   for (std::size_t i = 0; i < vertex_count; ++i) {
     const glm::vec3 p = mesh.positions[i];
     if (!is_finite(p) || std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kMaxCoordinate) {
-      throw InvalidArgument(where + " vertex " + std::to_string(i), text(p), "finite coordinates up to 1e12");
+      throw InvalidArgument(where + " vertex " + std::to_string(i), text_of(p),
+                            "finite coordinates up to 1e12");
     }
   }
   if (!mesh.normals.empty() && mesh.normals.size() != vertex_count) {
@@ -171,7 +169,8 @@ void check_mesh(const std::string& where, const TriangleMesh& mesh, std::size_t 
   }
   for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
     if (!is_unit(mesh.normals[i])) {
-      throw InvalidArgument(where + " normal " + std::to_string(i), text(mesh.normals[i]), "a unit vector");
+      throw InvalidArgument(where + " normal " + std::to_string(i), text_of(mesh.normals[i]),
+                            "a unit vector");
     }
   }
   if (!mesh.uvs.empty() && mesh.uvs.size() != vertex_count) {
@@ -180,7 +179,7 @@ void check_mesh(const std::string& where, const TriangleMesh& mesh, std::size_t 
   }
   for (std::size_t i = 0; i < mesh.uvs.size(); ++i) {
     if (!is_finite(mesh.uvs[i])) {
-      throw InvalidArgument(where + " uv " + std::to_string(i), text(mesh.uvs[i]), "finite values");
+      throw InvalidArgument(where + " uv " + std::to_string(i), text_of(mesh.uvs[i]), "finite values");
     }
   }
   double area = 0.0;
@@ -195,7 +194,7 @@ void check_mesh(const std::string& where, const TriangleMesh& mesh, std::size_t 
     area += triangle_area(mesh, t);
   }
   if (!(area > 0.0))
-    throw InvalidArgument(where + " area", std::to_string(area), "at least one triangle with an area");
+    throw InvalidArgument(where + " area", text_of(area), "at least one triangle with an area");
   if (!mesh.parts.empty() && mesh.parts.size() != mesh.triangles.size()) {
     throw InvalidArgument(where + " part index count", std::to_string(mesh.parts.size()),
                           "0 or the triangle count " + std::to_string(mesh.triangles.size()));
@@ -219,17 +218,17 @@ void check_object(const Scene& scene, std::size_t index) {
 }
 
 void check_position(const std::string& where, glm::vec3 position) {
-  if (!is_finite(position)) throw InvalidArgument(where, text(position), "finite coordinates");
+  if (!is_finite(position)) throw InvalidArgument(where, text_of(position), "finite coordinates");
 }
 
 void check_radiance(const std::string& where, glm::vec3 radiance) {
   if (!is_finite_nonnegative(radiance)) {
-    throw InvalidArgument(where, text(radiance), "finite values of at least 0");
+    throw InvalidArgument(where, text_of(radiance), "finite values of at least 0");
   }
 }
 
 void check_direction(const std::string& where, glm::vec3 direction) {
-  if (!is_unit(direction)) throw InvalidArgument(where, text(direction), "a unit vector");
+  if (!is_unit(direction)) throw InvalidArgument(where, text_of(direction), "a unit vector");
 }
 
 void check_light(const std::string& where, const RectangleLight& light) {
@@ -237,14 +236,14 @@ void check_light(const std::string& where, const RectangleLight& light) {
   check_position(where + " edge_u", light.edge_u);
   check_position(where + " edge_v", light.edge_v);
   const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
-  if (!(area > 0.0)) throw InvalidArgument(where + " area", std::to_string(area), "edges that span an area");
+  if (!(area > 0.0)) throw InvalidArgument(where + " area", text_of(area), "edges that span an area");
   check_radiance(where + " radiance", light.radiance);
 }
 
 void check_light(const std::string& where, const SphereLight& light) {
   check_position(where + " centre", light.centre);
   if (!(light.radius > 0.0F && light.radius <= kMaxCoordinate)) {
-    throw InvalidArgument(where + " radius", text(light.radius), "a length in (0, 1e12]");
+    throw InvalidArgument(where + " radius", text_of(light.radius), "a length in (0, 1e12]");
   }
   check_radiance(where + " radiance", light.radiance);
 }
@@ -264,11 +263,11 @@ void check_light(const std::string& where, const SpotLight& light) {
   check_direction(where + " direction", light.direction);
   check_radiance(where + " intensity", light.intensity);
   if (!(light.outer_degrees > 0.0F && light.outer_degrees <= 90.0F)) {
-    throw InvalidArgument(where + " outer_degrees", text(light.outer_degrees), "an angle in (0, 90]");
+    throw InvalidArgument(where + " outer_degrees", text_of(light.outer_degrees), "an angle in (0, 90]");
   }
   if (!(light.inner_degrees >= 0.0F && light.inner_degrees < light.outer_degrees)) {
-    throw InvalidArgument(where + " inner_degrees", text(light.inner_degrees),
-                          "an angle from 0 to below outer_degrees, " + text(light.outer_degrees));
+    throw InvalidArgument(where + " inner_degrees", text_of(light.inner_degrees),
+                          "an angle from 0 to below outer_degrees, " + text_of(light.outer_degrees));
   }
 }
 
@@ -278,10 +277,10 @@ void check_light(const std::string& where, const EnvironmentLight& light) {
   check_texels(where + " panorama", light.panorama, std::numeric_limits<float>::max(),
                "a finite value of at least 0");
   if (!(light.scale >= 0.0F) || !is_finite(light.scale)) {
-    throw InvalidArgument(where + " scale", text(light.scale), "a finite value of at least 0");
+    throw InvalidArgument(where + " scale", text_of(light.scale), "a finite value of at least 0");
   }
   if (!is_finite(light.rotation_degrees)) {
-    throw InvalidArgument(where + " rotation_degrees", text(light.rotation_degrees), "a finite angle");
+    throw InvalidArgument(where + " rotation_degrees", text_of(light.rotation_degrees), "a finite angle");
   }
 }
 

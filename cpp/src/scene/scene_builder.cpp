@@ -13,10 +13,6 @@
 namespace mirrorbake {
 namespace {
 
-std::string text(glm::vec3 v) {
-  return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
-}
-
 std::string unique_name(const std::string& wanted, std::map<std::string, int>& taken) {
   int& count = taken[wanted];
   if (++count == 1) return wanted;
@@ -95,7 +91,7 @@ Image TextureReader::decode(const std::string& name, std::span<const unsigned ch
   }
   for (const float v : image.pixels) {
     if (!(v >= 0.0F) || !std::isfinite(v)) {
-      throw FileError(name, "has the value " + std::to_string(v) + ", expected finite ones of at least 0");
+      throw FileError(name, "has the value " + text_of(v) + ", expected finite ones of at least 0");
     }
   }
   reserve(name, image.width, image.height, image.channel_count());
@@ -153,7 +149,7 @@ Texture TextureReader::read_file_texture(const std::string& path, Transfer trans
 glm::vec3 radiance(const std::string& path, const std::string& what, glm::vec3 value) {
   for (int i = 0; i < 3; ++i) {
     if (!(value[i] >= 0.0F) || !std::isfinite(value[i])) {
-      throw FileError(path, what + " is " + text(value) + ", expected finite values of at least 0");
+      throw FileError(path, what + " is " + text_of(value) + ", expected finite values of at least 0");
     }
   }
   return value;

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -15,14 +16,12 @@ constexpr int kMaxSegments = 4096;
 
 void check_finite(const char* argument, glm::vec3 v) {
   if (std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z)) return;
-  throw InvalidArgument(
-      argument, "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")",
-      "finite coordinates");
+  throw InvalidArgument(argument, text_of(v), "finite coordinates");
 }
 
 void check_length(const char* argument, float length) {
   if (length > 0.0F && std::isfinite(length)) return;
-  throw InvalidArgument(argument, std::to_string(length), "a finite length above 0");
+  throw InvalidArgument(argument, text_of(length), "a finite length above 0");
 }
 
 void check_segments(int segments) {
@@ -86,7 +85,7 @@ TriangleMesh make_rectangle(glm::vec3 corner, glm::vec3 u, glm::vec3 v) {
   check_finite("v", v);
   const glm::dvec3 normal = glm::cross(glm::dvec3(u), glm::dvec3(v));
   const double area = glm::length(normal);
-  if (!(area > 0.0)) throw InvalidArgument("area of u × v", std::to_string(area), "edges that span an area");
+  if (!(area > 0.0)) throw InvalidArgument("area of u × v", text_of(area), "edges that span an area");
   TriangleMesh mesh;
   const glm::vec3 unit(normal / area);
   add_vertex(mesh, corner, unit, {0.0F, 0.0F});
@@ -103,8 +102,8 @@ TriangleMesh make_box(glm::vec3 min, glm::vec3 max) {
   const glm::vec3 size = max - min;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(size[axis] > 0.0F)) {
-      throw InvalidArgument("max", std::to_string(max[axis]) + " on axis " + std::to_string(axis),
-                            "more than min, " + std::to_string(min[axis]));
+      throw InvalidArgument("max", text_of(max[axis]) + " on axis " + std::to_string(axis),
+                            "more than min, " + text_of(min[axis]));
     }
   }
   const glm::vec3 x(size.x, 0, 0);
@@ -215,8 +214,8 @@ TriangleMesh make_torus(glm::vec3 centre, float ring_radius, float tube_radius, 
   check_length("tube_radius", tube_radius);
   check_segments(segments);
   if (tube_radius >= ring_radius) {
-    throw InvalidArgument("tube_radius", std::to_string(tube_radius),
-                          "less than ring_radius, " + std::to_string(ring_radius));
+    throw InvalidArgument("tube_radius", text_of(tube_radius),
+                          "less than ring_radius, " + text_of(ring_radius));
   }
   TriangleMesh mesh;
   const int tube_segments = std::max(3, segments / 2);

@@ -7,6 +7,7 @@
 #include "fresnel_batch.hpp"
 #include "fresnel_formulas.hpp"
 #include "fresnel_kernels.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -21,7 +22,7 @@ std::vector<float> tabulate(const ReflectanceFunction& reflectance, std::size_t 
   for (std::size_t i = 0; i < size; ++i) {
     const double value = reflectance(static_cast<double>(i) / static_cast<double>(size - 1));
     if (!(value >= 0.0 && value <= 1.0)) {
-      throw InvalidArgument("reflectance", std::to_string(value), "a function with values in [0,1]");
+      throw InvalidArgument("reflectance", text_of(value), "a function with values in [0,1]");
     }
     values[i] = static_cast<float>(value);
   }
@@ -75,7 +76,7 @@ FresnelTable make_table(const ReflectanceFunction& reflectance, std::size_t size
 
 FresnelTable table_for_error(const ReflectanceFunction& reflectance, double max_error) {
   if (!(max_error >= 1e-6 && max_error <= 1.0)) {
-    throw InvalidArgument("max_error", std::to_string(max_error), "1e-6 to 1");
+    throw InvalidArgument("max_error", text_of(max_error), "1e-6 to 1");
   }
   const auto suffices = [&](std::size_t size) {
     return error_of(tabulate(reflectance, size), reflectance, max_error) <= max_error;

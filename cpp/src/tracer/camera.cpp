@@ -7,20 +7,17 @@
 
 #include "camera_rays.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
-
-std::string text(glm::vec3 v) {
-  return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
-}
 
 // As far out as a scene may reach: Embree aborts on rays that start beyond 1.844e18.
 void check_coordinates(const char* name, glm::vec3 v) {
   constexpr float kMaxCoordinate = 1e12F;
   for (int axis = 0; axis < 3; ++axis) {
     if (std::abs(v[axis]) <= kMaxCoordinate) continue;
-    throw InvalidArgument(std::string("camera.") + name, text(v), "finite coordinates up to 1e12");
+    throw InvalidArgument(std::string("camera.") + name, text_of(v), "finite coordinates up to 1e12");
   }
 }
 
@@ -34,8 +31,7 @@ void validate(const Camera& camera) {
   }
   const float fov = camera.vertical_fov_degrees;
   if (!(fov > 0.0F && fov < 180.0F)) {
-    throw InvalidArgument("camera.vertical_fov_degrees", std::to_string(fov),
-                          "more than 0 and less than 180");
+    throw InvalidArgument("camera.vertical_fov_degrees", text_of(fov), "more than 0 and less than 180");
   }
   check_coordinates("eye", camera.eye);
   check_coordinates("target", camera.target);
@@ -43,10 +39,10 @@ void validate(const Camera& camera) {
   const glm::dvec3 view = glm::dvec3(camera.target) - glm::dvec3(camera.eye);
   const double distance = glm::length(view);
   if (!(distance > 0.0))
-    throw InvalidArgument("camera.target", text(camera.target), "a point other than the eye");
+    throw InvalidArgument("camera.target", text_of(camera.target), "a point other than the eye");
   const double up = glm::length(glm::dvec3(camera.up));
   if (!(up > 0.0) || glm::length(glm::cross(view / distance, glm::dvec3(camera.up) / up)) < 1e-6) {
-    throw InvalidArgument("camera.up", text(camera.up), "a direction that is not along the view");
+    throw InvalidArgument("camera.up", text_of(camera.up), "a direction that is not along the view");
   }
 }
 

@@ -14,6 +14,7 @@
 #include "integrator.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "options.hpp"
 #include "state.hpp"
 
@@ -31,10 +32,6 @@ constexpr float kLargestCoordinate = 1e18F;
 bool usable(glm::vec3 p) {
   return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate &&
          std::abs(p.z) <= kLargestCoordinate;
-}
-
-std::string text(glm::vec3 v) {
-  return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
 }
 
 const Scene& validated(const Scene& scene) {
@@ -58,13 +55,13 @@ void check_rays(std::span<const glm::vec3> origins, std::span<const glm::vec3> d
 /// Ray number `i` with all checks, its direction made a unit vector. Throws InvalidArgument if it is not usable.
 Ray checked_ray(glm::vec3 origin, glm::vec3 direction, std::size_t i, glm::vec3 scene_origin) {
   if (!usable(origin)) {
-    throw InvalidArgument("origins[" + std::to_string(i) + "]", text(origin),
+    throw InvalidArgument("origins[" + std::to_string(i) + "]", text_of(origin),
                           "finite coordinates up to 1e18");
   }
   // The squares of very short and very long vectors lose digits in float.
   const double length = glm::length(glm::dvec3(direction));
   if (!std::isfinite(length) || length == 0.0) {
-    throw InvalidArgument("directions[" + std::to_string(i) + "]", text(direction),
+    throw InvalidArgument("directions[" + std::to_string(i) + "]", text_of(direction),
                           "a finite vector other than 0");
   }
   return {origin - scene_origin, glm::vec3(glm::dvec3(direction) / length)};
@@ -157,7 +154,7 @@ void check_range(const char* argument, int value, int low, int high) {
 }
 
 void check_point(const char* argument, glm::vec3 point) {
-  if (!usable(point)) throw InvalidArgument(argument, text(point), "finite coordinates up to 1e18");
+  if (!usable(point)) throw InvalidArgument(argument, text_of(point), "finite coordinates up to 1e18");
 }
 
 void validate(const TraceOptions& options) {
@@ -220,7 +217,7 @@ BeautyTrace Tracer::trace_beauty_to_noise(const Camera& camera, float noise,
   validate(camera);
   tracing::validate(options);
   if (!(noise > 0.0F && noise <= 1.0F)) {
-    throw InvalidArgument("noise", std::to_string(noise), "more than 0 and at most 1");
+    throw InvalidArgument("noise", text_of(noise), "more than 0 and at most 1");
   }
   constexpr int kFirstSamples = 16;
   if (options.samples_per_pixel < kFirstSamples) {

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <string>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
@@ -43,6 +46,19 @@ TEST(Text, MessagesOfErrorsAreValid) {
             std::string("a.obj: has 'K") + kReplacement + "'");
   EXPECT_EQ(std::string(InvalidArgument("name", "\xE4", "text").what()),
             std::string("name is ") + kReplacement + ", expected text");
+}
+
+TEST(Text, OfNumbersIsTheShortestThatReadsBack) {
+  EXPECT_EQ(text_of(0.1F), "0.1");
+  EXPECT_EQ(text_of(1e-12), "1e-12");
+  EXPECT_EQ(text_of(static_cast<double>(0.1F)), "0.10000000149011612");
+  EXPECT_EQ(text_of(std::numeric_limits<float>::denorm_min()), "1e-45");
+  EXPECT_EQ(text_of(-std::numeric_limits<float>::infinity()), "-inf");
+  EXPECT_EQ(text_of(std::numeric_limits<double>::quiet_NaN()), "nan");
+  EXPECT_EQ(text_of(-std::numeric_limits<double>::max()), "-1.7976931348623157e+308");
+  EXPECT_EQ(text_of(glm::vec2(1.0F, -0.5F)), "(1, -0.5)");
+  EXPECT_EQ(text_of(glm::vec3(0.0F, 1e30F, 0.3F)), "(0, 1e+30, 0.3)");
+  EXPECT_EQ(text_of(glm::dvec3(0.0, 0.1, -2.0)), "(0, 0.1, -2)");
 }
 
 }  // namespace

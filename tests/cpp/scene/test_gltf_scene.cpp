@@ -414,7 +414,7 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
       {"baseColorFactor is (-", material(R"({"pbrMetallicRoughness":{"baseColorFactor":[-1,0,0,1]}})")},
       {"metallicFactor is 1.5", material(R"({"pbrMetallicRoughness":{"metallicFactor":1.5}})")},
       {"roughnessFactor is -0.1", material(R"({"pbrMetallicRoughness":{"roughnessFactor":-0.1}})")},
-      {"emission is (0.000000, -1", material(R"({"emissiveFactor":[0,-1,0]})")},
+      {"emission is (0, -1", material(R"({"emissiveFactor":[0,-1,0]})")},
       {"emission is (inf", material(R"({"emissiveFactor":[1e300,0,0]})")},
       {"emission is (-", material(R"({"emissiveFactor":[1,1,1],"extensions":
           {"KHR_materials_emissive_strength":{"emissiveStrength":-2}}})")},

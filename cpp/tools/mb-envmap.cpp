@@ -20,6 +20,7 @@
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/envmap/compare.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
@@ -274,6 +275,9 @@ void print_samples(EnvMap map, const std::vector<std::vector<float>>& directions
   std::vector<glm::vec3> ddx(d.size(), glm::vec3(0.0F));
   std::vector<glm::vec3> ddy = ddx;
   if (filter == SampleFilter::trilinear || filter == SampleFilter::ewa) {
+    if (!std::isfinite(footprint)) {
+      throw InvalidArgument("--footprint", text_of(footprint), "0 to 179 degrees");
+    }
     if (map.layout.levels == 1) map = build_mips(map, MipFilter::seamless);
     for (std::size_t i = 0; i < d.size(); ++i) std::tie(ddx[i], ddy[i]) = pixel_around(d[i], footprint);
   }

@@ -118,6 +118,8 @@ def test_samples_over_a_footprint_use_the_levels(panorama: Path, tmp_path: Path)
             arguments = ("--filter", name, "--footprint", 20, "--direction", 0, 2, 0, "--json")
             line = json.loads(mb_envmap("sample", tmp_path / file, *arguments))
             assert line["value"] == pytest.approx(np.ravel(expected).tolist(), rel=2e-3), file
+    wrong = ("--filter", "ewa", "--footprint", "nan", "--direction", 0, 2, 0)
+    assert "--footprint is nan" in mb_envmap("sample", tmp_path / "cube.exr", *wrong, status=3)
     sharp = json.loads(mb_envmap("sample", tmp_path / "cube.exr", "--direction", 0, 2, 0, "--json"))
     assert line["value"] != pytest.approx(sharp["value"], rel=1e-2)
 

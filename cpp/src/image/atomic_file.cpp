@@ -17,6 +17,8 @@ AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
   if (path_.empty()) throw FileError("''", "an output path may not be empty");
   std::error_code error;
   if (fs::is_directory(path_, error)) throw FileError(path_, "is a directory");
+  // A rename would replace the device itself.
+  if (fs::is_other(path_, error)) throw FileError(path_, "is a device or a pipe, expected a file");
   const fs::path folder = fs::path(path_).parent_path();
   if (!folder.empty() && !fs::is_directory(folder, error)) {
     throw FileError(path_, "the folder " + folder.string() + " does not exist");

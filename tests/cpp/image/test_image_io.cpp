@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -293,6 +294,13 @@ TEST_F(ImageFiles, APathIsCheckedWithoutWritingToIt) {
   EXPECT_THROW(check_image_path(path("none/a.exr")), FileError);
   EXPECT_THROW(check_image_path(""), FileError);
   EXPECT_EQ(files(), 0u);
+}
+
+// Root could rename a file over it.
+TEST(AtomicFile, DoesNotReplaceDevices) {
+  const std::string text = "text";
+  EXPECT_THROW(write_file("/dev/null", std::as_bytes(std::span(text))), FileError);
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
 }
 
 }  // namespace

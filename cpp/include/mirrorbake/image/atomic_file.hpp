@@ -10,7 +10,7 @@ namespace mirrorbake {
 /// same folder, then `commit()`. Without a commit the destructor removes the temporary file.
 class AtomicFile {
  public:
-  /// Throws FileError if `path` is empty or a directory, or if its folder does not exist.
+  /// Throws FileError if `path` is empty, a directory, a device or a pipe, or if its folder does not exist.
   explicit AtomicFile(std::string path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;

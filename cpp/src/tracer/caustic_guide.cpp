@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "barycentric.hpp"
 #include "cdf.hpp"
 #include "integrator.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -117,7 +118,7 @@ namespace {
 glm::vec3 point_at(const World& world, const Hit& hit) {
   const glm::uvec3 c = world.scene.objects[hit.geometry].mesh.triangles[hit.triangle];
   const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(hit.geometry));
-  return (1.0F - hit.u - hit.v) * p[c.x] + hit.u * p[c.y] + hit.v * p[c.z];
+  return interpolate(p, c, {hit.u, hit.v});
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "barycentric.hpp"
 #include "gather.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "world.hpp"
@@ -96,8 +97,7 @@ glm::vec3 IrradianceCache::interpolate(const Sides& values, const Surface& surfa
   if (slots.empty()) return glm::vec3(0.0F);
   const std::uint32_t* slot = &slots[3 * std::size_t{surface.triangle}];
   const std::vector<glm::vec3>& value = values.side[surface.front ? 0 : 1];
-  return (1.0F - surface.barycentric.x - surface.barycentric.y) * value[slot[0]] +
-         surface.barycentric.x * value[slot[1]] + surface.barycentric.y * value[slot[2]];
+  return tracing::interpolate(value, {slot[0], slot[1], slot[2]}, surface.barycentric);
 }
 
 template <typename IrradianceAt>

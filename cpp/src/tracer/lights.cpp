@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "barycentric.hpp"
 #include "cdf.hpp"
 #include "sample_stream.hpp"
 #include "surface.hpp"
@@ -384,12 +385,12 @@ std::optional<LightSample> Lights::sample_mesh(int object, glm::vec3 position, g
   const Mesh& mesh = meshes_[index];
   const TriangleMesh& source = scene_->objects[index].mesh;
   const CdfSample t = sample_cdf(mesh.area_cdf.data(), static_cast<int>(source.triangles.size()), u.x);
-  const glm::uvec3 corner = source.triangles[static_cast<std::size_t>(t.index)];
+  const auto triangle = static_cast<std::uint32_t>(t.index);
+  const glm::uvec3 corner = source.triangles[triangle];
   const std::span<const glm::vec3> p = rays_->positions(object);
   const float root = std::sqrt(t.place);
-  const float b1 = root * (1.0F - u.y);
-  const float b2 = root * u.y;
-  const glm::vec3 point = (1.0F - b1 - b2) * p[corner.x] + b1 * p[corner.y] + b2 * p[corner.z];
+  const glm::vec2 barycentric(root * (1.0F - u.y), root * u.y);
+  const glm::vec3 point = interpolate(p, corner, barycentric);
   const glm::vec3 to = point - position;
   const float distance = glm::length(to);
   if (!(distance > 0.0F)) return std::nullopt;
@@ -398,10 +399,7 @@ std::optional<LightSample> Lights::sample_mesh(int object, glm::vec3 position, g
   if (!(cosine > 0.0F)) return std::nullopt;
   const Material& material = scene_->materials[static_cast<std::size_t>(scene_->objects[index].material)];
   glm::vec3 emission = material.emission;
-  glm::vec2 uv(0.0F);
-  if (!source.uvs.empty()) {
-    uv = (1.0F - b1 - b2) * source.uvs[corner.x] + b1 * source.uvs[corner.y] + b2 * source.uvs[corner.z];
-  }
+  const glm::vec2 uv = uv_at(source, triangle, barycentric);
   if (material.emission_texture.texture >= 0) {
     emission *= texture_lookup(*scene_, material.emission_texture, uv);
   }

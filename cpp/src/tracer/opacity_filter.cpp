@@ -4,6 +4,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "barycentric.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/sampling.hpp"
 
@@ -28,18 +29,12 @@ void filter(const RTCFilterFunctionNArguments* arguments) {
   const auto& lookup = *static_cast<const OpacityLookup*>(arguments->geometryUserPtr);
   const Object& object = lookup.scene->objects[lookup.object];
   const Material& material = lookup.scene->materials[static_cast<std::size_t>(object.material)];
-  const TriangleMesh& mesh = object.mesh;
   for (unsigned i = 0; i < arguments->N; ++i) {
     if (arguments->valid[i] == 0) continue;
     const unsigned triangle = RTCHitN_primID(arguments->hit, arguments->N, i);
-    glm::vec2 uv(0.0F);
-    if (!mesh.uvs.empty()) {
-      const glm::uvec3 corner = mesh.triangles[triangle];
-      const float u = RTCHitN_u(arguments->hit, arguments->N, i);
-      const float v = RTCHitN_v(arguments->hit, arguments->N, i);
-      uv = (1.0F - u - v) * mesh.uvs[corner.x] + u * mesh.uvs[corner.y] + v * mesh.uvs[corner.z];
-    }
-    const float opacity = opacity_at(*lookup.scene, material, uv);
+    const glm::vec2 barycentric(RTCHitN_u(arguments->hit, arguments->N, i),
+                                RTCHitN_v(arguments->hit, arguments->N, i));
+    const float opacity = opacity_at(*lookup.scene, material, uv_at(object.mesh, triangle, barycentric));
     if (opacity >= 1.0F) continue;
     if (opacity <= chance(arguments->ray, arguments->N, i, lookup.object, triangle)) arguments->valid[i] = 0;
   }

@@ -5,6 +5,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "barycentric.hpp"
+
 namespace mirrorbake::tracing {
 namespace {
 
@@ -40,16 +42,6 @@ glm::vec3 small_triangle_normal(glm::vec3 a, glm::vec3 b, glm::vec3 c) {
   return length > 0.0 ? glm::vec3(n / length) : glm::vec3(0.0F);
 }
 
-namespace {
-
-glm::vec2 uv_at(const TriangleMesh& mesh, glm::uvec3 corner, const Hit& hit) {
-  if (mesh.uvs.empty()) return glm::vec2(0.0F);
-  return (1.0F - hit.u - hit.v) * mesh.uvs[corner.x] + hit.u * mesh.uvs[corner.y] +
-         hit.v * mesh.uvs[corner.z];
-}
-
-}  // namespace
-
 glm::vec3 fresnel_at(const Surface& surface, float cosine) {
   if (surface.reflectance_scale == glm::vec3(1.0F)) return evaluate(surface.material->fresnel, cosine);
   Fresnel fresnel = surface.material->fresnel;
@@ -71,8 +63,7 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
   const glm::vec3 a = positions[corner.x];
   const glm::vec3 b = positions[corner.y];
   const glm::vec3 c = positions[corner.z];
-  const float w = 1.0F - hit.u - hit.v;
-  s.position = w * a + hit.u * b + hit.v * c;
+  s.position = interpolate(positions, corner, s.barycentric);
   // The interpolation is off by a few roundings of the largest coordinate, and so is the intersector's own
   // arithmetic, in which the axes mix: 8 roundings cover both (tests trace from 1e-3 m to 1e5 m).
   const glm::vec3 largest = glm::max(glm::abs(a), glm::max(glm::abs(b), glm::abs(c)));
@@ -83,8 +74,7 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
   s.front = glm::dot(s.geometric_normal, s.view) >= 0.0F;
   s.normal = s.geometric_normal;
   if (!mesh.normals.empty()) {
-    const glm::vec3 n =
-        w * mesh.normals[corner.x] + hit.u * mesh.normals[corner.y] + hit.v * mesh.normals[corner.z];
+    const glm::vec3 n = interpolate(mesh.normals, corner, s.barycentric);
     const float length = glm::length(n);
     // A normal on the wrong side of its triangle is a defect of the mesh.
     if (length > 1e-6F && glm::dot(n, s.geometric_normal) > 0.0F) s.normal = n / length;
@@ -95,25 +85,28 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
   } else {
     s.emission = s.material->emission;
     if (s.material->emission_texture.texture >= 0 && s.emission != glm::vec3(0.0F)) {
-      s.emission *= texture_lookup(scene, s.material->emission_texture, uv_at(mesh, corner, hit));
+      s.emission *=
+          texture_lookup(scene, s.material->emission_texture, uv_at(mesh, s.triangle, s.barycentric));
     }
   }
 
   s.albedo = s.material->albedo;
   if (s.material->albedo_texture.texture >= 0 && s.albedo != glm::vec3(0.0F)) {
-    s.albedo *= texture_lookup(scene, s.material->albedo_texture, uv_at(mesh, corner, hit));
+    s.albedo *= texture_lookup(scene, s.material->albedo_texture, uv_at(mesh, s.triangle, s.barycentric));
   }
   if (s.material->specular) {
     s.normal = bend_normal(s.view, s.normal, s.geometric_normal);
     s.reflection = glm::normalize(reflect_about(s.view, s.normal));
     if (s.material->specular_texture.texture >= 0) {
-      s.reflectance_scale = texture_lookup(scene, s.material->specular_texture, uv_at(mesh, corner, hit));
+      s.reflectance_scale =
+          texture_lookup(scene, s.material->specular_texture, uv_at(mesh, s.triangle, s.barycentric));
     }
     s.fresnel = fresnel_at(s, glm::dot(s.normal, s.view));
     if (s.material->lobe == SpecularLobe::ggx) {
       s.roughness = s.material->roughness;
       if (s.material->roughness_texture.texture >= 0) {
-        s.roughness *= texture_lookup(scene, s.material->roughness_texture, uv_at(mesh, corner, hit)).x;
+        s.roughness *=
+            texture_lookup(scene, s.material->roughness_texture, uv_at(mesh, s.triangle, s.barycentric)).x;
       }
       s.roughness = std::max(s.roughness, kSmoothest);
     }
@@ -169,8 +162,7 @@ SurfaceDifferential surface_differential(const Scene& scene, const RayScene& ray
       const glm::vec3 n0 = mesh.normals[corner.x];
       const glm::vec3 n1 = mesh.normals[corner.y];
       const glm::vec3 n2 = mesh.normals[corner.z];
-      const glm::vec3 n = (1.0F - surface.barycentric.x - surface.barycentric.y) * n0 +
-                          surface.barycentric.x * n1 + surface.barycentric.y * n2;
+      const glm::vec3 n = interpolate(mesh.normals, corner, surface.barycentric);
       const float length = std::max(glm::length(n), 1e-6F);
       const glm::vec3 change = ((n1 - n0) * du + (n2 - n0) * dv) / length;
       dnormal = (surface.front ? 1.0F : -1.0F) * (change - glm::dot(change, surface.normal) * surface.normal);

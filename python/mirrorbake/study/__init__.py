@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
-from pathlib import Path  # noqa: TC003 (typer reads the annotations)
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -14,6 +14,10 @@ from mirrorbake import _core
 from mirrorbake.command import reports_errors
 
 app = typer.Typer(help="Measure what approximations cost and how far off they are.", no_args_is_help=True)
+
+
+Json = Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for plots. [default: none]")]
 
 
 @app.callback()
@@ -28,12 +32,8 @@ def _number(value: float | None) -> str:
 @app.command("fresnel")
 @reports_errors
 def fresnel_command(
-    json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for plots. [default: none]")
-    ] = None,
+    json: Json = False,
+    out: Out = None,
     max_error: Annotated[float, typer.Option("--max-error", help="What tables are made for.")] = 1e-3,
     samples: Annotated[
         int, typer.Option("--samples", min=10, max=100_000, help="Cosines per curve compared with 50 digits.")
@@ -58,8 +58,7 @@ def fresnel_command(
 
 
 def _print_fresnel(result: dict[str, Any]) -> None:
-    console = Console(highlight=False)
-    console = Console(highlight=False, width=max(console.width, 100))
+    console = Console(highlight=False, width=max(Console().width, 100))
     table = Table(
         *("material", "float32 error", "ns", "Schlick error", "ns", "entries", "table error", "ns"),
         title=f"Against the full equations in float64; {result['isa']}, {result['threads']} threads",
@@ -86,12 +85,8 @@ def _print_fresnel(result: dict[str, Any]) -> None:
 @app.command("proxy")
 @reports_errors
 def proxy_command(
-    json: Annotated[
-        bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for a plot. [default: none]")
-    ] = None,
+    json: Json = False,
+    out: Out = None,
     samples: Annotated[
         int, typer.Option("--samples", min=2, max=100_000, help="Rays per shape, flatness and depth.")
     ] = 30,

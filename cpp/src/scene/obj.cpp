@@ -33,11 +33,12 @@ class MemoryBuffer : public std::streambuf {
   explicit MemoryBuffer(std::string& bytes) { setg(bytes.data(), bytes.data(), bytes.data() + bytes.size()); }
 };
 
-bool is_finite_number(std::string_view token) {
+bool is_finite_float(std::string_view token) {
   if (token.starts_with('+')) token.remove_prefix(1);
   double value = 0.0;
   const auto [stop, code] = std::from_chars(token.data(), token.data() + token.size(), value);
-  return code == std::errc() && stop == token.data() + token.size() && std::isfinite(value);
+  return code == std::errc() && stop == token.data() + token.size() &&
+         std::abs(value) <= std::numeric_limits<float>::max();
 }
 
 // position, position/uv, position//normal or position/uv/normal, each an integer.
@@ -79,10 +80,10 @@ void check_tokens(const std::string& path, std::string_view text) {
     for (std::string_view token = next_token(); !token.empty() && token.front() != '#';
          token = next_token()) {
       ++found;
-      if (is_face ? is_face_corner(token) : is_finite_number(token)) continue;
+      if (is_face ? is_face_corner(token) : is_finite_float(token)) continue;
       throw FileError(path,
                       "line " + std::to_string(line_number) + " has '" + std::string(token.substr(0, 40)) +
-                          (is_face ? "', expected the indices of a corner" : "', expected a finite number"));
+                          (is_face ? "', expected the indices of a corner" : "', expected a finite float32"));
     }
     if (found < needed) {
       throw FileError(path, "line " + std::to_string(line_number) + " has " + std::to_string(found) +

@@ -107,6 +107,7 @@ TEST_F(Obj, EveryDefectIsAFileErrorThatSaysWhatIsWrong) {
       {triangle + "v nan 0 0\nf 1 2 3\n", "line 4 has 'nan'"},
       {triangle + "v 1 inf 0\nf 1 2 4\n", "line 4 has 'inf'"},
       {triangle + "v 1 1e999 0\nf 1 2 4\n", "line 4 has '1e999'"},
+      {triangle + "vt 0 1e39\nf 1/1 2/1 3/1\n", "line 4 has '1e39', expected a finite float32"},
       {triangle + "\r\nv 1 abc 0\r\nf 1 2 4\n", "line 5 has 'abc'"},
       {triangle + "v 1 2\nf 1 2 4\n", "line 4 has 2 numbers"},
       {triangle + "vn 0 1\nf 1 2 3\n", "line 4 has 2 numbers"},

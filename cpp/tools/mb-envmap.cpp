@@ -1,6 +1,4 @@
 // mb-envmap: inspects, converts, filters, samples and compares environment maps.
-//
-// Exit status: 0 done, 2 usage, 3 input that cannot be read or makes no sense, 4 a computation without an answer.
 
 #include <CLI/CLI.hpp>
 
@@ -272,12 +270,10 @@ void print_samples(EnvMap map, const std::vector<std::vector<float>>& directions
     }
     d.emplace_back(v[0], v[1], v[2]);
   }
+  if (!std::isfinite(footprint)) throw InvalidArgument("--footprint", text_of(footprint), "0 to 179 degrees");
   std::vector<glm::vec3> ddx(d.size(), glm::vec3(0.0F));
   std::vector<glm::vec3> ddy = ddx;
   if (filter == SampleFilter::trilinear || filter == SampleFilter::ewa) {
-    if (!std::isfinite(footprint)) {
-      throw InvalidArgument("--footprint", text_of(footprint), "0 to 179 degrees");
-    }
     if (map.layout.levels == 1) map = build_mips(map, MipFilter::seamless);
     for (std::size_t i = 0; i < d.size(); ++i) std::tie(ddx[i], ddy[i]) = pixel_around(d[i], footprint);
   }
@@ -311,8 +307,8 @@ void compare_files(const Input& first, const Input& second, bool json) {
   const EnvMapLayout& b = reference.layout;
   if (a.projection != b.projection || a.width != b.width || a.height != b.height ||
       a.channels != b.channels) {
-    throw InvalidArgument("input", describe(first.path, a),
-                          "projection, size and channels of " + describe(second.path, b));
+    throw FileError(describe(first.path, a),
+                    "differs in projection, size or channels from " + describe(second.path, b));
   }
   print_comparison(compare(map, reference), json);
 }

@@ -1,6 +1,4 @@
 // mb-trace: path-traced images of a scene, the segmented layers of its reflectors, and environment maps of it.
-//
-// Exit status: 0 done, 2 usage, 3 input that cannot be read or makes no sense, 4 a computation without an answer.
 
 #include <CLI/CLI.hpp>
 #include <unistd.h>
@@ -124,9 +122,22 @@ EnvironmentLight white_sky() {
   return sky;
 }
 
-// Panoramas that were scaled down with a sharpening filter undershoot beside their lights.
+// Grey as R, G, B; without alpha. Panoramas that were scaled down with a sharpening filter undershoot beside their
+// lights.
 Image load_panorama(const std::string& path) {
-  Image panorama = load_image(path);
+  const Image image = load_image(path);
+  const bool is_grey = image.channel_count() == 1;
+  const std::vector<std::string> rgb = {"R", "G", "B"};
+  if (!is_grey &&
+      (image.channel_count() < 3 || !std::equal(rgb.begin(), rgb.end(), image.channels.begin()))) {
+    throw FileError(path, "does not start with the channels R, G, B");
+  }
+  Image panorama(image.width, image.height, rgb);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      for (int c = 0; c < 3; ++c) panorama.at(x, y)[c] = image.at(x, y)[is_grey ? 0 : c];
+    }
+  }
   std::size_t negative = 0;
   for (float& value : panorama.pixels) {
     if (!std::isfinite(value)) throw FileError(path, "has values that are not finite, expected radiance");
@@ -377,7 +388,7 @@ struct Layers {
       }
       numbers.push_back(static_cast<int>(found - scene.objects.begin()));
     }
-    if (numbers.empty()) throw InvalidArgument("scene", request.path, "an object with a specular material");
+    if (numbers.empty()) throw FileError(request.path, "has no object with a specular material");
     return numbers;
   }
 

@@ -58,8 +58,9 @@ inline void warn_of_losses(const char* program, const std::string& path, const S
   }
 }
 
-/// The program's exit status: what `run` returns (0 done, 2 usage), 3 for input that cannot be read or makes no sense,
-/// or output that cannot be written, 4 for a computation without an answer, both with a message on stderr.
+/// The program's exit status: what `run` returns (0 done, 2 usage), 2 for an argument with a value that it does not
+/// take, 3 for a file that cannot be read, makes no sense or cannot be written, 4 for a computation without an answer;
+/// all of them with a message on stderr.
 template <typename Run>
 int exit_status(const char* program, const Run& run) {
   try {
@@ -67,6 +68,9 @@ int exit_status(const char* program, const Run& run) {
     std::cout.flush();
     if (!std::cout || std::fflush(stdout) != 0) throw FileError("standard output", "cannot be written");
     return status;
+  } catch (const InvalidArgument& error) {
+    std::fprintf(stderr, "%s: %s\n", program, error.what());
+    return 2;
   } catch (const NumericalError& error) {
     std::fprintf(stderr, "%s: %s\n", program, error.what());
     return 4;

@@ -1,6 +1,6 @@
 """The command line. Data goes to stdout, progress and messages to stderr.
 
-Exit status: 0 success, 2 wrong usage, 3 bad input, 4 a computation that cannot give an answer, 130
+Exit status: 0 success, 2 wrong usage, 3 bad files, 4 a computation that cannot give an answer, 130
 interrupted. Commands import what they need themselves: `--help` should not wait for Zarr and matplotlib.
 """
 

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, ParamSpec, TypeVar
 import typer
 
 from mirrorbake import _core
-from mirrorbake.errors import InputError
+from mirrorbake.errors import InputError, OptionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+EXIT_USAGE = 2
 EXIT_INPUT = 3
 EXIT_NUMERICAL = 4
 EXIT_INTERRUPTED = 130
@@ -34,6 +35,8 @@ def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             return command(*args, **kwargs)
+        except OptionError as failure:
+            raise _fail(str(failure), EXIT_USAGE) from None
         except (InputError, _core.InvalidArgument, OSError) as failure:
             raise _fail(str(failure), EXIT_INPUT) from None
         except MemoryError:

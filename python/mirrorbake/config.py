@@ -24,7 +24,7 @@ from pydantic import (
 )
 
 from mirrorbake import _core
-from mirrorbake.errors import InputError
+from mirrorbake.errors import InputError, OptionError
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -385,6 +385,11 @@ def _describe(error: ErrorDetails) -> str:
     return f"{key} = {error['input']!r}: {message}"
 
 
+def _describe_all(errors: Sequence[ErrorDetails]) -> str:
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    return _describe(errors[0]) + more
+
+
 def parse_config(data: Mapping[str, Any], source: str) -> SceneConfig:
     """Validate a scene given as nested mappings.
 
@@ -411,9 +416,7 @@ def parse_config(data: Mapping[str, Any], source: str) -> SceneConfig:
     try:
         return SceneConfig.model_validate(data)
     except ValidationError as failure:
-        errors = failure.errors()
-        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-        raise InputError(f"{source}: {_describe(errors[0])}{more}") from None
+        raise InputError(f"{source}: {_describe_all(failure.errors())}") from None
 
 
 def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
@@ -429,7 +432,7 @@ def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
     key, separator, value = text.partition("=")
     path = tuple(step.strip() for step in key.split("."))
     if not separator or len(path) < 2 or not all(path):
-        raise InputError(f"--set {text!r}: expected section.key=value")
+        raise OptionError(f"--set {text!r}: expected section.key=value")
     try:
         return path, tomllib.loads(f"value = {value.strip()}")["value"]
     except tomllib.TOMLDecodeError:
@@ -465,7 +468,8 @@ def load_config(path: Path, overrides: Sequence[tuple[tuple[str, ...], Any]] = (
     Raises
     ------
     InputError
-        The file is missing or not TOML, or a key is wrong.
+        The file is missing or not TOML, or a key is wrong. It is an OptionError if the key, or one that it
+        does not go with, is an override.
     """
     data = _read_toml(path)
     _resolve_paths(data, path.resolve().parent)
@@ -474,7 +478,19 @@ def load_config(path: Path, overrides: Sequence[tuple[tuple[str, ...], Any]] = (
         _insert(replacements, keys, value)
     _resolve_paths(replacements, Path.cwd())
     _merge(data, replacements)
-    return parse_config(data, str(path))
+    try:
+        return SceneConfig.model_validate(data)
+    except ValidationError as failure:
+        errors = failure.errors()
+        if any(_concerns(errors[0], keys) for keys, _ in overrides):
+            raise OptionError(_describe_all(errors)) from None
+        raise InputError(f"{path}: {_describe_all(errors)}") from None
+
+
+def _concerns(error: ErrorDetails, keys: tuple[str, ...]) -> bool:
+    place = error["loc"]
+    shared = min(len(place), len(keys))
+    return shared > 0 and place[:shared] == keys[:shared]
 
 
 # What a new value of a key makes meaningless.
@@ -496,7 +512,7 @@ def _insert(data: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
     for key in keys[:-1]:
         data = data.setdefault(key, {})
         if not isinstance(data, dict):
-            raise InputError(f"--set {'.'.join(keys)}: {key} is not a section")
+            raise OptionError(f"--set {'.'.join(keys)}: {key} is not a section")
     data[keys[-1]] = value
 
 

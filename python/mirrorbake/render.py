@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mirrorbake import _core
-from mirrorbake.errors import InputError
+from mirrorbake.errors import InputError, OptionError
 from mirrorbake.evaluate import open_pem
 from mirrorbake.files import check_writable
 from mirrorbake.run_time import images_of_trace
@@ -43,7 +43,7 @@ def render(directory: Path, t: float, out: Path) -> FloatArray:
     if out.suffix.lower() not in PICTURE_SUFFIXES:
         raise InputError(f"{out}: expected a name that ends in {' or '.join(PICTURE_SUFFIXES)}")
     if not 0.0 <= t <= 1.0:
-        raise InputError(f"view = {t:g}: expected a parameter of the arc, from 0 to 1")
+        raise OptionError(f"view = {t:g}: expected a parameter of the arc, from 0 to 1")
     check_writable(out)
     pem = open_pem(directory)
     first, _, weight = pem.run_time.neighbours(t)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.errors import InputError
+from mirrorbake.errors import OptionError
 from mirrorbake.store import ViewImages
 
 if TYPE_CHECKING:
@@ -112,11 +112,11 @@ class RunTime:
 
         Raises
         ------
-        InputError
+        OptionError
             t is outside [0,1].
         """
         if not 0.0 <= t <= 1.0:
-            raise InputError(f"view = {t:g}: expected a parameter of the arc, from 0 to 1")
+            raise OptionError(f"view = {t:g}: expected a parameter of the arc, from 0 to 1")
         parameters = self._header.parameters
         place = t * (len(parameters) - 1)
         nearest = round(place)

@@ -64,8 +64,8 @@ def run_process(*arguments: str | Path) -> Outcome:
     return Outcome(result.returncode, result.stdout, result.stderr)
 
 
-def assert_one_error(result: Outcome, *words: str) -> None:
-    assert result.returncode == EXIT_INPUT, result.stderr
+def assert_one_error(result: Outcome, *words: str, status: int = EXIT_INPUT) -> None:
+    assert result.returncode == status, result.stderr
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
     errors = [line for line in result.stderr.splitlines() if line.startswith("mirrorbake: error: ")]
@@ -123,7 +123,8 @@ def test_version_is_the_librarys() -> None:
 def test_a_process_ends_with_the_status_and_the_streams_of_the_manual(tmp_path: Path) -> None:
     assert run_process("fly").returncode == EXIT_USAGE
     scene = write_scene(tmp_path)
-    assert_one_error(run_process("bake", scene, "--out", tmp_path / "pem", "--em-size", "3"), "maps.size = 3")
+    wrong = run_process("bake", scene, "--out", tmp_path / "pem", "--em-size", "3")
+    assert_one_error(wrong, "maps.size = 3", status=EXIT_USAGE)
     result = run_process("bake", scene, "--out", tmp_path / "pem", "--views", "1")
     assert (result.returncode, result.stdout) == (0, ""), result.stderr
     result = run_process("evaluate", tmp_path / "pem", "--json")
@@ -176,16 +177,29 @@ def test_wrong_usage_is_exit_2(tmp_path: Path, arguments: list[str]) -> None:
         (["--em-size", "8192"], ["maps.size = 8192"]),
         (["--seed", "-1"], ["trace.seed = -1"]),
         (["--set", "maps.sise=16"], ["maps.sise", "is not a key"]),
-        (["--set", "reflector.mesh=nowhere.obj"], ["nowhere.obj", "No such file"]),
-        (["--set", "surroundings.panorama=nowhere.exr"], ["nowhere.exr", "No such file"]),
-        (["--set", "material.texture=nowhere.png"], ["nowhere.png", "No such file"]),
     ],
 )
 def test_a_value_out_of_range_is_one_clear_error(
     tmp_path: Path, options: list[str], words: list[str]
 ) -> None:
     result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *options, cwd=tmp_path)
-    assert_one_error(result, *words)
+    assert_one_error(result, *words, status=EXIT_USAGE)
+    assert "scene.toml" not in result.stderr
+    assert not (tmp_path / "pem").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "file"),
+    [
+        ("reflector.mesh", "nowhere.obj"),
+        ("surroundings.panorama", "nowhere.exr"),
+        ("material.texture", "nowhere.png"),
+    ],
+)
+def test_a_missing_file_is_one_clear_error(tmp_path: Path, key: str, file: str) -> None:
+    options = ["--set", f"{key}={file}"]
+    result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *options, cwd=tmp_path)
+    assert_one_error(result, file, "No such file")
     assert not (tmp_path / "pem").exists()
 
 

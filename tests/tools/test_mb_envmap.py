@@ -119,7 +119,7 @@ def test_samples_over_a_footprint_use_the_levels(panorama: Path, tmp_path: Path)
             line = json.loads(mb_envmap("sample", tmp_path / file, *arguments))
             assert line["value"] == pytest.approx(np.ravel(expected).tolist(), rel=2e-3), file
     wrong = ("--filter", "ewa", "--footprint", "nan", "--direction", 0, 2, 0)
-    assert "--footprint is nan" in mb_envmap("sample", tmp_path / "cube.exr", *wrong, status=3)
+    assert "--footprint is nan" in mb_envmap("sample", tmp_path / "cube.exr", *wrong, status=2)
     sharp = json.loads(mb_envmap("sample", tmp_path / "cube.exr", "--direction", 0, 2, 0, "--json"))
     assert line["value"] != pytest.approx(sharp["value"], rel=1e-2)
 
@@ -138,14 +138,14 @@ def test_errors_say_what_is_wrong_and_write_nothing(panorama: Path, tmp_path: Pa
     before = sorted(tmp_path.iterdir())
     out = tmp_path / "out.exr"
     assert "does not exist" in mb_envmap("info", tmp_path / "none.exr", status=3)
-    assert "projection is globe" in mb_envmap("convert", panorama, "--to", "globe", "-o", out, status=3)
+    assert "projection is globe" in mb_envmap("convert", panorama, "--to", "globe", "-o", out, status=2)
     assert "--size is 12y" in mb_envmap(
-        "convert", panorama, "--to", "cube", "--size", "12y", "-o", out, status=3
+        "convert", panorama, "--to", "cube", "--size", "12y", "-o", out, status=2
     )
     assert "folder" in mb_envmap(
         "convert", panorama, "--to", "cube", "-o", tmp_path / "no" / "out.exr", status=3
     )
-    assert "KTX2" in mb_envmap("convert", panorama, "--to", "latlong", "-o", tmp_path / "a.ktx2", status=3)
+    assert "KTX2" in mb_envmap("convert", panorama, "--to", "latlong", "-o", tmp_path / "a.ktx2", status=2)
     mb_envmap("convert", panorama, "-o", out, status=2)
     mb_envmap(status=2)
     mb_envmap("info", panorama, "--threads", "-1", status=2)
@@ -219,8 +219,10 @@ def test_a_ktx2_of_three_channels_compares_with_the_map_it_was_made_from(tmp_pat
     assert (
         json.loads(mb_envmap("compare", tmp_path / "a.ktx2", tmp_path / "a.exr", "--json"))["max_error"] == 0
     )
-    for wish in (["--layout", "cross"], ["--format", "uint8"]):
-        mb_envmap("convert", tmp_path / "a.exr", "--to", "cube", "-o", tmp_path / "b.ktx2", *wish, status=3)
+    for status, *wish in ((2, "--layout", "cross"), (3, "--format", "uint8")):
+        mb_envmap(
+            "convert", tmp_path / "a.exr", "--to", "cube", "-o", tmp_path / "b.ktx2", *wish, status=status
+        )
     assert not (tmp_path / "b.ktx2").exists()
 
 
@@ -253,11 +255,11 @@ def test_borders_go_into_any_layout_and_are_reported(tmp_path: Path) -> None:
     assert (report["width"], report["height"]) == (12, 12)
     faces = EnvMap.load(tmp_path / "w_{}.exr").values
     np.testing.assert_array_equal(faces.reshape(wide.shape), wide)
-    assert "--output" in mb_envmap("border", tmp_path / "a.exr", "-o", tmp_path / "w.ktx2", status=3)
+    assert "--output" in mb_envmap("border", tmp_path / "a.exr", "-o", tmp_path / "w.ktx2", status=2)
 
 
 def test_directions_are_three_numbers_each(panorama: Path) -> None:
-    assert "--direction" in mb_envmap("sample", panorama, "--direction", 0, 0, 1, 1, 0, 0, status=3)
+    assert "--direction" in mb_envmap("sample", panorama, "--direction", 0, 0, 1, 1, 0, 0, status=2)
 
 
 def test_output_that_nobody_can_read_is_an_error(panorama: Path) -> None:
@@ -275,4 +277,5 @@ def test_outputs_are_checked_before_the_input_is_read(tmp_path: Path) -> None:
     nothing = tmp_path / "none.exr"
     message = mb_envmap("convert", nothing, "--to", "cube", "-o", tmp_path / "a.doc", status=3)
     assert "a.doc" in message
+    assert ".ktx2" in message
     assert "none.exr" not in message

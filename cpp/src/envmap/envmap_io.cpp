@@ -219,6 +219,11 @@ void check_envmap_path(const std::string& path, const Projection& projection, Fa
     }
     return;
   }
+  if (!path.empty() && !has_image_extension(path)) {
+    throw FileError(path,
+                    "has an unknown extension, expected .exr, .hdr, .tif, .tiff, .png, .jpg, .jpeg, or .ktx2 "
+                    "for a cube map");
+  }
   const bool several = names_faces(path);
   check_image_path(several && faces > 1 ? face_path(path, projection, 0) : path, format);
   if (several && faces == 1) throw InvalidArgument("path", path, "no {}: the map has one face");

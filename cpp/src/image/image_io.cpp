@@ -70,7 +70,7 @@ FileKind kind_from_content(const std::string& path) {
   return kind_from_head(path, head);
 }
 
-FileKind kind_from_extension(const std::string& path) {
+std::optional<FileKind> known_extension(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -79,6 +79,11 @@ FileKind kind_from_extension(const std::string& path) {
   if (extension == ".tif" || extension == ".tiff") return FileKind::tiff;
   if (extension == ".png") return FileKind::png;
   if (extension == ".jpg" || extension == ".jpeg") return FileKind::jpeg;
+  return std::nullopt;
+}
+
+FileKind kind_from_extension(const std::string& path) {
+  if (const std::optional<FileKind> kind = known_extension(path)) return *kind;
   throw FileError(path, "has an unknown extension, expected .exr, .hdr, .tif, .tiff, .png, .jpg or .jpeg");
 }
 
@@ -482,6 +487,8 @@ Image decode_image(const std::string& name, std::span<const unsigned char> bytes
   check_complete(name, kind, bytes);
   return file_errors(name, [&] { return read(name, kind, options, bytes); });
 }
+
+bool has_image_extension(const std::string& path) { return known_extension(path).has_value(); }
 
 void check_image_path(const std::string& path, PixelFormat format) {
   if (path.empty()) throw FileError("''", "an output path may not be empty");

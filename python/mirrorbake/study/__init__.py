@@ -12,6 +12,7 @@ from rich.table import Table
 
 from mirrorbake import _core
 from mirrorbake.command import reports_errors
+from mirrorbake.errors import OptionError
 
 app = typer.Typer(help="Measure what approximations cost and how far off they are.", no_args_is_help=True)
 
@@ -46,7 +47,10 @@ def fresnel_command(
     from mirrorbake.study import fresnel
 
     limit = _core.ThreadLimit(threads)
-    result = fresnel.study(max_error, samples)
+    try:
+        result = fresnel.study(max_error, samples)
+    except _core.InvalidArgument as failure:
+        raise OptionError(str(failure)) from None
     del limit
     if out is not None:
         for path in fresnel.plot(result, out):

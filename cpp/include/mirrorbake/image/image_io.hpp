@@ -65,6 +65,9 @@ struct DecodeOptions {
 Image decode_image(const std::string& name, std::span<const unsigned char> bytes,
                    const DecodeOptions& options = {});
 
+/// Whether the extension of `path` names a format that save_image writes.
+bool has_image_extension(const std::string& path);
+
 /// What save_image would refuse whatever the image is: throws FileError if the extension of `path` names no format or one
 /// that cannot store `format`, if `path` is empty or a folder, or its folder does not exist. Nothing is written.
 void check_image_path(const std::string& path, PixelFormat format = PixelFormat::automatic);

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.arrays import real_array
 from mirrorbake.projection import vectors
 
 if TYPE_CHECKING:
@@ -71,8 +72,15 @@ class EnvMap:
             Name of the projection.
         channels
             Names; by default Y, YA, RGB, RGBA, or numbers.
+
+        Raises
+        ------
+        TypeError
+            The array is not one of real numbers.
+        ValueError
+            It has another shape.
         """
-        block = np.ascontiguousarray(array, np.float32)
+        block = np.ascontiguousarray(real_array("array", array, np.float32))
         faces = {"cube": 6, "dual_paraboloid": 2}.get(projection.partition(":")[0], 1)
         expected = 4 if faces > 1 else 3
         if block.ndim != expected or (faces > 1 and block.shape[0] != faces):
@@ -345,7 +353,7 @@ def _resampler(
 ) -> _core.Resampler:
     height, width = _height_and_width(projection, size)
     matrix = np.eye(3, dtype=np.float32) if source_from_target is None else source_from_target
-    matrix = np.ascontiguousarray(matrix, np.float32)
+    matrix = np.ascontiguousarray(real_array("source_from_target", matrix, np.float32))
     if matrix.shape != (3, 3):
         raise _core.InvalidArgument(f"source_from_target has shape {matrix.shape}, expected (3, 3)")
     if max_bytes < 0:

@@ -1,8 +1,9 @@
 """Fresnel reflectance of smooth surfaces (spec section 3): exact models, tables, metals and layers.
 
 Cosines are those between the direction to the eye and the normal, on the side the light comes from. They
-are clamped to [0, 1]; NaN stays NaN. Everything broadcasts as NumPy does. Results are float32 where all
-arrays are float32 (Python numbers do not count), else float64.
+are clamped to [0, 1]; NaN stays NaN. Arrays of anything but real numbers are a TypeError. Everything
+broadcasts as NumPy does. Results are float32 where all arrays are float32 (Python numbers do not count), else
+float64.
 
 >>> import numpy as np
 >>> from mirrorbake import fresnel
@@ -19,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mirrorbake import _core
+from mirrorbake.arrays import real_array
 
 __all__ = [
     "Conductor",
@@ -51,19 +53,20 @@ def _result_type(*values: ArrayLike) -> type[np.float32] | type[np.float64]:
     return np.float32 if arrays and all(dtype == np.float32 for dtype in arrays) else np.float64
 
 
-def _broadcast(c: ArrayLike, parameters: tuple[ArrayLike, ...]) -> tuple[Array, tuple[Any, ...]]:
+def _broadcast(c: ArrayLike, parameters: dict[str, ArrayLike]) -> tuple[Array, tuple[Any, ...]]:
     """Cosines and parameters of one type: one number per parameter where all are scalars, else arrays."""
-    dtype: Any = _result_type(c, *parameters)
-    if all(np.ndim(parameter) == 0 for parameter in parameters):
-        return np.asarray(c, dtype), tuple(float(np.asarray(parameter)) for parameter in parameters)
-    arrays = np.broadcast_arrays(*(np.asarray(value, dtype) for value in (c, *parameters)))
+    dtype: Any = _result_type(c, *parameters.values())
+    cosines = real_array("c", c, dtype)
+    if all(np.ndim(parameter) == 0 for parameter in parameters.values()):
+        return cosines, tuple(float(real_array(name, p, np.float64)) for name, p in parameters.items())
+    arrays = np.broadcast_arrays(cosines, *(real_array(name, p, dtype) for name, p in parameters.items()))
     return arrays[0], tuple(np.ascontiguousarray(array) for array in arrays[1:])
 
 
-def _apply(function: Any, out: Array | None, c: ArrayLike, *parameters: ArrayLike) -> Array:
+def _apply(function: Any, out: Array | None, c: ArrayLike, **parameters: ArrayLike) -> Array:
     """Call a function of C-contiguous arrays of one type; arrays with plain numbers go straight to it."""
-    arguments: tuple[Any, ...] = parameters
-    if not (type(c) is np.ndarray and c.dtype in _NATIVE and all(isinstance(p, float) for p in parameters)):
+    arguments: tuple[Any, ...] = tuple(parameters.values())
+    if not (type(c) is np.ndarray and c.dtype in _NATIVE and all(isinstance(p, float) for p in arguments)):
         c, arguments = _broadcast(c, parameters)
     if out is None:
         out = np.empty(c.shape, c.dtype)
@@ -95,7 +98,7 @@ def schlick(c: ArrayLike, r0: ArrayLike, out: Array | None = None) -> Array:
     -----
     Schlick 1994, "An inexpensive BRDF model for physically-based rendering", eq. 15.
     """
-    return _apply(_core.fresnel_schlick, out, c, r0)
+    return _apply(_core.fresnel_schlick, out, c, r0=r0)
 
 
 def dielectric(c: ArrayLike, ior: ArrayLike, out: Array | None = None) -> Array:
@@ -120,13 +123,13 @@ def dielectric(c: ArrayLike, ior: ArrayLike, out: Array | None = None) -> Array:
     -----
     [EMT] eq. 13, in a form without cancellation.
     """
-    return _apply(_core.fresnel_dielectric, out, c, ior)
+    return _apply(_core.fresnel_dielectric, out, c, ior=ior)
 
 
 def dielectric_transmittance(c: ArrayLike, ior: float) -> npt.NDArray[np.float64]:
     """What a dielectric lets through, ``1 - dielectric(c, ior)``, accurate also where that is nearly 0."""
     transmittance = np.vectorize(_core.fresnel_dielectric_transmittance, otypes=[np.float64])
-    return np.asarray(transmittance(np.asarray(c, np.float64), ior))
+    return np.asarray(transmittance(real_array("c", c, np.float64), ior))
 
 
 def conductor(c: ArrayLike, eta: ArrayLike, k: ArrayLike, out: Array | None = None) -> Array:
@@ -151,7 +154,7 @@ def conductor(c: ArrayLike, eta: ArrayLike, k: ArrayLike, out: Array | None = No
     -----
     Born & Wolf, Principles of Optics, section 14.2.
     """
-    return _apply(_core.fresnel_conductor, out, c, eta, k)
+    return _apply(_core.fresnel_conductor, out, c, eta=eta, k=k)
 
 
 @dataclass(frozen=True)
@@ -274,7 +277,7 @@ def metal_reflectance(metal: str, c: ArrayLike, illuminant: str = "D65") -> npt.
     -----
     CIE 1931 2° observer, 380 to 780 nm in steps of 5 nm; Johnson & Christy 1972, 1974, Rakić 1995.
     """
-    cosines = np.asarray(c, np.float64)
+    cosines = real_array("c", c, np.float64)
     flat = _core.metal_reflectance(metal, np.ascontiguousarray(cosines), illuminant)
     return np.asarray(flat.reshape((*cosines.shape, 3)))
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.arrays import real_array
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -33,8 +34,10 @@ def vectors(name: str, values: ArrayLike, components: int) -> NDArray[np.float32
     ------
     InvalidArgument
         For other shapes; it calls the values by ``name``.
+    TypeError
+        For values that are not real numbers.
     """
-    array = np.asarray(values, np.float32)
+    array = real_array(name, values, np.float32)
     if array.shape[-1:] != (components,):
         raise _core.InvalidArgument(f"{name} has the shape {array.shape}, expected (..., {components})")
     return array
@@ -84,7 +87,7 @@ def directions_from_points(projection: str, faces: ArrayLike, points: ArrayLike)
         For faces that do not exist and positions that are not finite.
     """
     array = vectors("points", points, 2)
-    numbers = np.broadcast_to(np.asarray(faces, np.int32), array.shape[:-1])
+    numbers = np.broadcast_to(real_array("faces", faces, np.int32), array.shape[:-1])
     directions = _core.directions_from_points(
         projection, np.ascontiguousarray(numbers.reshape(-1)), array.reshape(-1, 2)
     )
@@ -123,4 +126,5 @@ def dual_paraboloid_texture_matrix(frame_from_map: ArrayLike, face: int) -> NDAr
     Applied to (r, 1), r the unit reflection vector in the space of ``frame_from_map`` (3×3, orthonormal), it
     gives (s q, t q, ·, q), with t downwards.
     """
-    return _core.dual_paraboloid_texture_matrix(np.ascontiguousarray(frame_from_map, np.float32), face)
+    matrix = real_array("frame_from_map", frame_from_map, np.float32)
+    return _core.dual_paraboloid_texture_matrix(np.ascontiguousarray(matrix), face)

@@ -217,6 +217,26 @@ def test_the_flux_of_a_photographed_panorama_is_kept_between_any_two_projections
             )
 
 
+@pytest.mark.parametrize(
+    "toward",
+    [(0.12, 0.1, 1.0), (0.1, 1.0, 0.07), (1.0, 1.0, 0.98), (1.0, 0.2, -0.99), (0.7, 0.6, 0.02)],
+    ids=["rim", "pole", "corner", "edge", "equator"],
+)
+def test_the_flux_of_a_sun_is_kept_where_projections_are_singular(toward: tuple[float, float, float]) -> None:
+    d = texel_directions("latlong", 512, 256)
+    image = np.full((256, 512, 1), 0.5, np.float32)
+    image[d @ (np.array(toward) / np.linalg.norm(toward)) > np.cos(np.radians(1.5))] = 2e3
+    panorama = EnvMap.from_array(image, "latlong")
+    # Some 25,000 texels each. The sun, of two to three of them across, has a third of the flux.
+    sizes = {"cube": 64, "dual_paraboloid": 112, "sphere_map": 160, "latlong": 112, "angular": 160}
+    for projection, size in sizes.items():
+        converted = panorama.resample(projection, size)
+        np.testing.assert_allclose(converted.flux(), panorama.flux(), rtol=1e-3, err_msg=f"to {projection}")
+        # Back it is interpolated, across the edges of faces as well.
+        back = converted.resample("latlong", 128)
+        np.testing.assert_allclose(back.flux(), converted.flux(), rtol=2e-3, err_msg=f"from {projection}")
+
+
 def test_wrong_shapes_and_sizes_are_named() -> None:
     cube = noise("cube", 4)
     for directions in ([1.0, 0.0], np.ones((2, 6)), 1.0):

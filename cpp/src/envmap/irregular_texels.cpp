@@ -47,15 +47,18 @@ double length_of(const Quad& quad) {
 }  // namespace
 
 StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& target) {
-  // Of some 0.06 rad: their edges bend by a hundredth of their length.
-  constexpr std::size_t kFewTexels = 3500;
-  const bool few = target.level_texels(0) < kFewTexels;
+  // Edges of texels of some 0.035 rad bend by half a hundredth of their length, but more near a singular rim.
+  const auto few_texels = [](ProjectionKind kind) -> std::size_t {
+    if (kind == ProjectionKind::sphere_map) return 60'000;
+    return kind == ProjectionKind::angular ? 15'000 : 10'000;
+  };
+  const bool few = target.level_texels(0) < few_texels(target.projection.kind);
   const double length = few ? 0.0 : std::min(0.25 * (source.width + 4), kLongest);
   constexpr double kAny = std::numeric_limits<double>::max();
   switch (source.projection.kind) {
-    // Around the poles of a panorama images are long and bent along their length: n texels of the target away
-    // from one straight edges shift 1/(12 n) of the area.
-    case ProjectionKind::latlong: return {0.1, kAny, length};
+    // Around the poles of a panorama images are long and bent along their length. Straight edges n texels of the target
+    // away from one shift 1/(12 n) of the area, which is lost or counted twice beside a texel that is traced.
+    case ProjectionKind::latlong: return {0.03, kAny, length};
     case ProjectionKind::cube:
     case ProjectionKind::dual_paraboloid: return {0.01, kAny, length};
     // Along a rim that is a single direction they are slivers, which a small bend empties.
@@ -85,6 +88,15 @@ double texel_side(double area, double squares) {
 double interpolated_share(double side) {
   const double share = std::clamp(4.0 - 4.0 * side, 0.0, 1.0);
   return share * share * (3.0 - 2.0 * share);
+}
+
+double interpolable(const EnvMapLayout& source, glm::dvec2 position) {
+  if (source.projection.kind != ProjectionKind::sphere_map) return 1.0;
+  // Over a quarter of the radius, but no less than sixteen texels: the smoother, the less flux it moves.
+  const double radius = 0.5 * source.width;
+  const double from_rim = radius - 1.0 - glm::length(position - radius);
+  const double t = std::clamp(from_rim / std::max(16.0, 0.25 * radius), 0.0, 1.0);
+  return t * t * (3.0 - 2.0 * t);
 }
 
 IrregularTexels::IrregularTexels(const ResampleJob& job)
@@ -150,7 +162,10 @@ std::optional<std::span<const Tap>> IrregularTexels::find(int face, glm::dvec2 l
   const glm::dvec2 middle = 0.5 * (low + high);
   clipped_ = disc_extent(job_.target.projection.kind, low, high) == DiscExtent::crosses_rim;
   double share = 0.0;
-  if (job_.filter == ResampleFilter::automatic) share = interpolated_share(texels_across(face, low, high));
+  if (job_.filter == ResampleFilter::automatic) {
+    share = interpolated_share(texels_across(face, low, high)) *
+            interpolable(job_.source, corner(face, middle.x, middle.y).position);
+  }
   for (const Content content : {Content::constant_texels, Content::interpolated}) {
     const double part = content == Content::interpolated ? share : 1.0 - share;
     if (part == 0.0) continue;

@@ -131,6 +131,7 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
   const double per_length = limits.per_length;
   const double most_shift = limits.shift;
   const double farthest = limits.length;
+  const double steepness = automatic ? 4.0 : 0.0;
   for (std::size_t i = 0; i < count; ++i) {
     const double bend_x = ax[i] + bx[i + 1] - ax[i + 1] - bx[i];
     const double bend_y = ay[i] + by[i + 1] - ay[i + 1] - by[i];
@@ -156,7 +157,7 @@ std::uint8_t classify(const PositionArrays& above, const PositionArrays& below, 
         (shift <= most_shift * cross) & (longest < farthest) & (side > 1e-3);
     // Above 0 from one texel down, 1 from three quarters down, and smooth in between: where it bends, the one
     // filter takes what the other does not give.
-    double share = automatic ? 4.0 - 4.0 * side : 0.0;
+    double share = steepness - steepness * side;
     share = share > 0.0 ? share : 0.0;
     share = share < 1.0 ? share : 1.0;
     share = share * share * (3.0 - 2.0 * share);

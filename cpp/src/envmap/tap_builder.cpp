@@ -208,7 +208,18 @@ void TapBuilder::classify() {
         kinds_[corner(row, column)] = kIrregular;
       }
     }
+    if (job_.projection().kind == ProjectionKind::sphere_map) fade_interpolation(row);
     kernels_.find_boxes(above, below, kinds_.data() + first, columns, face, boxes_from(first));
+  }
+}
+
+void TapBuilder::fade_interpolation(int row) {
+  for (std::size_t i = corner(row, 0); i < corner(row, tile_.columns); ++i) {
+    if (kinds_[i] == kIrregular || shares_[i] == 0.0F) continue;
+    const Quad image = quad(i);
+    const glm::dvec2 middle = 0.25 * (image[0] + image[1] + image[2] + image[3]);
+    shares_[i] *= static_cast<float>(interpolable(job_.source, middle));
+    if (shares_[i] < 1.0F) kinds_[i] = shares_[i] > 0.0F ? kBlend : kArea;
   }
 }
 

@@ -90,6 +90,7 @@ class TapBuilder {
   bool select_first_texels(const Tile& tile);
   void find_corners();
   void classify();
+  void fade_interpolation(int row);
   void find_centers();
   void find_blocks(TapChunk& chunk);
   void sort_blocks(TapChunk::Blocks& blocks);

@@ -343,12 +343,13 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   table->add_option("--max-error", options.max_error, "Largest error of linear interpolation")
       ->capture_default_str();
-  table->add_option("-o,--out", options.out, "Image of size × 1 pixels, float32 (.exr, .tif) instead of CSV");
+  table->add_option("-o,--output", options.out,
+                    "Image of size × 1 pixels, float32 (.exr, .tif) instead of CSV");
   table->callback([&] { write_table(options); });
 
   CLI::App* plot = app.add_subcommand("plot", "A curve over the angle of incidence, beside Schlick's: SVG");
   add_curve_options(*plot, options);
-  plot->add_option("-o,--out", options.out, "File (.svg) instead of stdout");
+  plot->add_option("-o,--output", options.out, "File (.svg) instead of stdout");
   plot->callback([&] { write_plot(options); });
 
   CLI::App* metal =

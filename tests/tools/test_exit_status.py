@@ -173,8 +173,8 @@ FILES = [
     *("mb-envmap sample NONE.exr --direction 0 0 1", "mb-envmap compare MAP.exr NONE.exr"),
     *(
         "mb-envmap compare MAP.exr TWO.exr",
-        "mb-fresnel table --out OUT.doc",
-        "mb-fresnel plot --out NONE/OUT.svg",
+        "mb-fresnel table --output OUT.doc",
+        "mb-fresnel plot --output NONE/OUT.svg",
     ),
     *("mirrorbake analyze NONE.toml", "mirrorbake analyze JUNK.toml", "mirrorbake analyze BAD.toml"),
     *("mirrorbake analyze BAD.toml --views 2", "mirrorbake analyze TOML --set reflector.mesh=NONE.obj"),

@@ -89,7 +89,7 @@ def test_tool_prints_the_table_as_csv(tool: str) -> None:
 
 def test_tool_writes_a_metal_as_exr(tool: str, tmp_path: Path) -> None:
     path = tmp_path / "gold.exr"
-    result = run(tool, "table", "--model", "metal", "--metal", "Au", "--max-error", "1e-3", "--out", path)
+    result = run(tool, "table", "--model", "metal", "--metal", "Au", "--max-error", "1e-3", "--output", path)
     assert result.returncode == 0, result.stderr
     pixels = np.asarray(_core.load_image(str(path))[0])
     expected = np.clip(fresnel.metal_reflectance("gold", np.linspace(0, 1, pixels.shape[1])), 0, 1)
@@ -114,7 +114,7 @@ def test_tool_reports_errors_and_metals_as_json(tool: str) -> None:
         (["table", "--max-error", "0"], 2, "max_error is 0"),
         (["metal", "mithril"], 2, "metal is mithril"),
         (["table", "--ior", "0.66", "--max-error", "1e-5"], 4, "65536"),
-        (["table", "--out", "/nonexistent/table.exr"], 3, "/nonexistent/table.exr"),
+        (["table", "--output", "/nonexistent/table.exr"], 3, "/nonexistent/table.exr"),
         ([], 2, "subcommand"),
     ],
 )

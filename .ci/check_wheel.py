@@ -21,12 +21,22 @@ def main(wheel: Path) -> None:
         development = [name for name in names if name.endswith((".a", ".hpp", ".cmake", ".cpp"))]
         if foreign or development:
             sys.exit(f"{wheel}: should hold the Python package alone, holds {foreign + development}")
-        for needed in ("mirrorbake/py.typed", "mirrorbake/_core.pyi"):
+        for needed in (
+            "mirrorbake/py.typed",
+            "mirrorbake/_core.pyi",
+            "mirrorbake/libmirrorbake_openimageio.so",
+        ):
             if needed not in names:
                 sys.exit(f"{wheel}: lacks {needed}")
         # -S keeps this environment's editable installation away; the dependencies still come from it.
         path = os.pathsep.join((target, sysconfig.get_path("purelib"), sysconfig.get_path("platlib")))
-        code = "import mirrorbake, mirrorbake._core as c; print(mirrorbake.__file__, c.__file__, c.version())"
+        # A PNG is read by the library that the extension module loads.
+        code = (
+            "import mirrorbake, mirrorbake._core as c, numpy;"
+            "print(mirrorbake.__file__, c.__file__, c.version());"
+            f"c.save_image({target!r} + '/a.png', numpy.ones((2, 3, 3), numpy.float32));"
+            f"assert c.load_image({target!r} + '/a.png')[0].shape == (2, 3, 3)"
+        )
         output = subprocess.run(
             [sys.executable, "-S", "-c", code],
             env={**os.environ, "PYTHONPATH": path},

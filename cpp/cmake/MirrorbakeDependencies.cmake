@@ -31,15 +31,20 @@ if(Eigen3_FOUND AND Eigen3_VERSION VERSION_LESS 3.4)
 endif()
 _mirrorbake_report(Eigen Eigen3_FOUND "${Eigen3_VERSION}" 3.4 libeigen3-dev "small dense algebra")
 
-# Debian's Imath, which OpenImageIO pulls in, reports its missing Python parts in spite of QUIET.
+find_package(ZLIB QUIET)
+_mirrorbake_report(zlib ZLIB_FOUND "${ZLIB_VERSION_STRING}" 1.2 zlib1g-dev "image files")
+
+# Debian's Imath, which OpenEXR and OpenImageIO pull in, reports its missing Python parts in spite of QUIET.
 set(_mirrorbake_log_level "${CMAKE_MESSAGE_LOG_LEVEL}")
 set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
+find_package(OpenEXR 3.1 CONFIG QUIET)
 find_package(OpenImageIO CONFIG QUIET)
 set(CMAKE_MESSAGE_LOG_LEVEL "${_mirrorbake_log_level}")
+_mirrorbake_report(OpenEXR OpenEXR_FOUND "${OpenEXR_VERSION}" 3.1 libopenexr-dev "EXR files")
 if(OpenImageIO_FOUND AND OpenImageIO_VERSION VERSION_LESS 2.4)
   set(OpenImageIO_FOUND FALSE)
 endif()
-_mirrorbake_report(OpenImageIO OpenImageIO_FOUND "${OpenImageIO_VERSION}" 2.4 libopenimageio-dev "image files")
+_mirrorbake_report(OpenImageIO OpenImageIO_FOUND "${OpenImageIO_VERSION}" 2.4 libopenimageio-dev "other image files")
 if(OpenImageIO_FOUND)
   # Debian's package lists the include folder of OpenCV, which its headers do not use and which need not exist.
   get_target_property(_oiio_includes OpenImageIO::OpenImageIO INTERFACE_INCLUDE_DIRECTORIES)

@@ -78,6 +78,9 @@ function(mirrorbake_add_tool name)
     target_link_libraries(${name} PRIVATE mirrorbake::${module})
   endforeach()
   target_compile_definitions(${name} PRIVATE MIRRORBAKE_VERSION="${PROJECT_VERSION}")
+  file(RELATIVE_PATH library_dir ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR}/mirrorbake)
+  set_target_properties(${name} PROPERTIES
+    INSTALL_RPATH "$<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>/${library_dir}")
   install(TARGETS ${name} COMPONENT tools)
 endfunction()
 

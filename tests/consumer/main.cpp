@@ -8,6 +8,7 @@
 #include "mirrorbake/core/version.hpp"
 #include "mirrorbake/envmap/cube_pyramid.hpp"
 #include "mirrorbake/envmap/cube_sampling.hpp"
+#include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/scene/shapes.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
@@ -44,6 +45,16 @@ int main() {
   const std::vector<glm::vec3> origin{glm::vec3(0.1F, 0.2F, 0.0F)};
   const std::vector<glm::vec3> direction{glm::vec3(0.0F, 0.0F, -1.0F)};
   expect("distance of a wall", tracer.intersect(origin, direction, {}).front().distance, 1.0, 1e-6);
+
+  // EXR files are read by the library itself, PNG files by the one that it loads.
+  for (const char* name : {"consumer.exr", "consumer.png"}) {
+    mirrorbake::Image image(2, 1, {"R", "G", "B"});
+    image.pixels = {1.0F, 0.0F, 1.0F, 0.0F, 1.0F, 1.0F};
+    mirrorbake::save_image(name, image);
+    const mirrorbake::Image again = mirrorbake::load_image(name);
+    expect(name, again.pixels == image.pixels ? 1.0 : 0.0, 1.0, 0.0);
+    std::remove(name);
+  }
 
   std::printf("mirrorbake %s\n", mirrorbake::version());
   return failures;

@@ -1,5 +1,7 @@
 """Image files through the binding; what the formats hold is tested in C++."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -41,3 +43,36 @@ def test_bad_files_and_arguments_raise_the_promised_errors(tmp_path: Path) -> No
         _core.save_image(str(tmp_path / "a.exr"), np.ones((2, 2, 3), np.float32), None, "int3")
     with pytest.raises(ValueError, match="at least one pixel"):
         _core.save_image(str(tmp_path / "a.exr"), np.ones((0, 2, 3), np.float32))
+
+
+def test_an_error_of_the_library_that_is_loaded_for_png_is_an_os_error(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    _core.save_image(str(path), np.ones((40, 30, 3), np.float32))
+    path.write_bytes(path.read_bytes()[:60])
+    with pytest.raises(_core.FileError, match=r"a\.png: is truncated"):
+        _core.load_image(str(path))
+    # This one is found behind the boundary of the libraries.
+    path = tmp_path / "a.hdr"
+    _core.save_image(str(path), np.ones((40, 30, 3), np.float32))
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(_core.FileError, match=r"^\S*a\.hdr: is damaged or truncated"):
+        _core.load_image(str(path))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc/self/maps")
+def test_importing_and_reading_exr_do_not_load_openimageio(tmp_path: Path) -> None:
+    code = f"""
+from pathlib import Path
+import mirrorbake
+from mirrorbake import _core
+import numpy as np
+def is_loaded():
+    return "libOpenImageIO" in Path("/proc/self/maps").read_text()
+_core.save_image({str(tmp_path / "a.exr")!r}, np.ones((2, 2, 3), np.float32))
+_core.load_image({str(tmp_path / "a.exr")!r})
+before = is_loaded()
+_core.save_image({str(tmp_path / "a.png")!r}, np.ones((2, 2, 3), np.float32))
+print(before, is_loaded())
+"""
+    output = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert output.split() == ["False", "True"]

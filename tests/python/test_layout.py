@@ -27,6 +27,7 @@ ALLOWED["pem"] = set(ALLOWED)
 # Each library is the business of the modules named here, and of their implementation only.
 OWNERS = {
     "embree": ("tracer",),
+    "OpenEXR": ("image",),
     "OpenImageIO": ("image",),
     "tbb": ("core",),
     "tiny_gltf": ("scene",),

@@ -28,6 +28,20 @@ def panorama(tmp_path: Path) -> Path:
     return path
 
 
+def test_without_the_library_for_other_files_exr_works_and_png_says_what_is_missing(
+    panorama: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A library that cannot be loaded, in a folder that is searched before the run path.
+    (tmp_path / "libmirrorbake_openimageio.so").write_text("no library")
+    monkeypatch.setenv("LD_LIBRARY_PATH", str(tmp_path))
+    mb_envmap("convert", panorama, "--to", "latlong", "--size", 16, "-o", tmp_path / "small.exr")
+    png = tmp_path / "small.png"
+    message = mb_envmap("convert", panorama, "--to", "latlong", "--size", 16, "-o", png, status=3)
+    assert "libmirrorbake_openimageio.so: is needed for HDR, TIFF, PNG and JPEG files" in message
+    assert "file too short" in message  # the loader's reason
+    assert not png.exists()
+
+
 def test_info_measures_the_map(panorama: Path) -> None:
     info = json.loads(mb_envmap("info", panorama, "--json"))
     assert (info["projection"], info["width"], info["height"], info["channels"]) == (

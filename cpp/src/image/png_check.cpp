@@ -1,5 +1,7 @@
 #include "png_check.hpp"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -9,22 +11,6 @@
 
 namespace mirrorbake::image_files {
 namespace {
-
-// CRC-32 of ISO 3309 by bytes, as in annex D of the PNG specification.
-constexpr std::array<std::uint32_t, 256> kCrcTable = [] {
-  std::array<std::uint32_t, 256> table{};
-  for (std::uint32_t i = 0; i < table.size(); ++i) {
-    std::uint32_t value = i;
-    for (int bit = 0; bit < 8; ++bit) value = (value >> 1) ^ ((value & 1u) != 0 ? 0xedb88320u : 0u);
-    table[i] = value;
-  }
-  return table;
-}();
-
-std::uint32_t update_crc(std::uint32_t crc, std::span<const unsigned char> bytes) {
-  for (const unsigned char byte : bytes) crc = kCrcTable[(crc ^ byte) & 0xffu] ^ (crc >> 8);
-  return crc;
-}
 
 std::uint32_t big_endian(std::span<const unsigned char, 4> bytes) {
   return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 | std::uint32_t{bytes[2]} << 8 |
@@ -49,18 +35,18 @@ void check_png(const std::string& name, const std::function<std::size_t(std::spa
     if (!std::all_of(type.begin(), type.end(), is_letter) || (first && text != "IHDR")) {
       throw FileError(name, "is damaged: its chunks cannot be told apart");
     }
-    std::uint32_t crc = update_crc(~0u, type);
+    uLong crc = crc32(0, type.data(), static_cast<uInt>(type.size()));
     for (std::size_t left = big_endian(std::span(head).first<4>()); left > 0;) {
       const std::span<unsigned char> part = std::span(buffer).first(std::min(left, buffer.size()));
       take(part);
-      crc = update_crc(crc, part);
+      crc = crc32(crc, part.data(), static_cast<uInt>(part.size()));
       left -= part.size();
     }
     std::array<unsigned char, 4> stored{};
     take(stored);
     // A small first letter marks what decoders may skip, and skip if it is damaged.
     const bool critical = type[0] <= 'Z';
-    if (critical && big_endian(stored) != ~crc) {
+    if (critical && big_endian(stored) != crc) {
       throw FileError(name, "is damaged: the checksum of its chunk " + text + " is wrong");
     }
     if (text == "IEND") return;

@@ -8,7 +8,8 @@
 
 #include "mirrorbake/image/image.hpp"
 
-/// Image files (EXR, HDR, TIFF, PNG, JPEG) through OpenImageIO, which stays behind this header.
+/// Image files: EXR through OpenEXR; HDR, TIFF, PNG and JPEG through OpenImageIO, in a library that is loaded when it is
+/// needed first. Neither is seen outside.
 namespace mirrorbake {
 
 /// Bounds of what a reader accepts: files are hostile until read. They are checked before pixels are
@@ -34,8 +35,9 @@ struct SaveReport {
 /// Reads a file as scene-linear float32. What kind of file it is follows from its first bytes, not from its
 /// name. Integer formats are decoded from sRGB unless the file says that it is linear; alpha is left alone,
 /// colour is multiplied by it (premultiplied, as EXR has it). The image is the display window: what a cropped
-/// data window leaves out is 0. Of a file with several images the first is read. Throws FileError if it is
-/// missing, not an image, truncated or beyond `limits`.
+/// data window leaves out is 0. Of a file with several images the first is read. Integer channels of EXR (ids) keep their
+/// values. Throws FileError if it is missing, not an image, truncated, beyond `limits`, or an EXR that claims more than its
+/// bytes can hold; HDR, TIFF, PNG and JPEG also if the library that reads them cannot be loaded.
 Image load_image(const std::string& path, const ImageLimits& limits = {});
 
 struct ImageSize {
@@ -61,7 +63,7 @@ struct DecodeOptions {
 };
 
 /// Decodes an image file that is in memory; `name` stands for its path in errors. As load_image, and FileError also if
-/// the image claims to be larger than its format can compress into so few bytes (all but EXR have such a bound).
+/// the image claims to be larger than its format can compress into so few bytes.
 Image decode_image(const std::string& name, std::span<const unsigned char> bytes,
                    const DecodeOptions& options = {});
 

@@ -33,6 +33,11 @@ if(MIRRORBAKE_SANITIZERS)
   target_compile_options(mirrorbake_build_flags INTERFACE
     -fsanitize=${MIRRORBAKE_SANITIZERS} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(mirrorbake_build_flags INTERFACE -fsanitize=${MIRRORBAKE_SANITIZERS})
+  if(NOT APPLE)
+    # The sanitizers' dlopen searches the DT_RUNPATH of their own library instead of the caller's; a DT_RPATH of the program
+    # holds for all.
+    target_link_options(mirrorbake_build_flags INTERFACE -Wl,--disable-new-dtags)
+  endif()
 endif()
 if(MIRRORBAKE_COVERAGE)
   target_compile_options(mirrorbake_build_flags INTERFACE --coverage -fprofile-update=atomic)

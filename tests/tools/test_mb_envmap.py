@@ -31,6 +31,9 @@ def panorama(tmp_path: Path) -> Path:
 def test_without_the_library_for_other_files_exr_works_and_png_says_what_is_missing(
     panorama: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    program = find_program("mb-envmap")
+    if program is not None and b"__asan_init" in program.read_bytes():
+        pytest.skip("programs built with sanitizers search their run path first")
     # A library that cannot be loaded, in a folder that is searched before the run path.
     (tmp_path / "libmirrorbake_openimageio.so").write_text("no library")
     monkeypatch.setenv("LD_LIBRARY_PATH", str(tmp_path))

@@ -1,10 +1,10 @@
 """Environment maps: conversions, mips and lookups against py360convert, skylibs, SciPy, oiiotool and maketx.
 
 The synthetic panorama has twelve lights of 5e4, 1° to 2° wide, before a background of 0.1 to 1. For
-conversions to fewer texels the error is the relative L2 distance to the mean of the panorama over each
-texel, by 24² places in float64; for smooth ones it is the distance to the analytic background, without
-lights. A real panorama, from MIRRORBAKE_TEST_DATA, is halved before it is made larger, so that the original
-is the reference.
+conversions to fewer texels, and to paraboloids, the error is the relative L2 distance to the mean of the
+source over each texel, by 24² places in float64; for smooth ones it is the distance to the analytic
+background, without lights. A real panorama, from MIRRORBAKE_TEST_DATA, is halved before it is made larger,
+so that the original is the reference.
 
 py360convert keeps the coordinates of a conversion. "first" is what one conversion costs, with its caches
 cleared; "again" is any further one of the same sizes. `kept` is a Resampler, which keeps what it knows, too:
@@ -94,25 +94,28 @@ def halved(envmap: EnvMap) -> EnvMap:
     return EnvMap.from_array((pairs / weights).astype(np.float32), "latlong")
 
 
-def mean_over_texels(source: EnvMap, size: int, rows: range) -> NDArray[np.float64]:
-    """Mean of a panorama over the area of some rows of a cube map, by many places of each texel."""
-    image = source.level()
-    height, width = image.shape[:2]
+def mean_over_texels(source: EnvMap, projection: str, size: int, rows: range) -> NDArray[np.float64]:
+    """Mean of a map, texels constant, over the area of some rows of another, by many places of each texel."""
+    image = source.level().reshape(-1, source.layout.height, source.layout.width, 3)
+    height, width = image.shape[1:3]
     means = []
     across = (np.arange(size * PLACES) + 0.5) / (size * PLACES) * 2 - 1
-    for face in range(6):
+    for target_face in range(6 if projection == "cube" else 2):
         for row in rows:
             down = 1 - (np.arange(row * PLACES, (row + 1) * PLACES) + 0.5) / (size * PLACES) * 2
-            places = np.stack(np.meshgrid(across, down), axis=-1).astype(np.float32)
-            d = directions_from_points("cube", np.full(places.shape[:-1], face, np.int32), places)
-            # The density of solid angle is the cube of the normalised direction's largest component.
-            weight = np.abs(d).max(axis=-1).astype(np.float64) ** 3
-            _, points = points_from_directions("latlong", d)
+            places = np.stack(np.meshgrid(across, down), axis=-1)
+            faces = np.full(places.shape[:-1], target_face, np.int32)
+            d = directions_from_points(projection, faces, places.astype(np.float32))
+            # The density of solid angle.
+            exponent = -1.5 if projection == "cube" else -2.0
+            weight = (1 + (places**2).sum(axis=-1)) ** exponent
+            face, points = points_from_directions(source.projection, d)
             column = np.minimum(((points[..., 0] + 1) / 2 * width).astype(int), width - 1)
             line = np.minimum(((1 - points[..., 1]) / 2 * height).astype(int), height - 1)
-            values = (image[line, column] * weight[..., None]).reshape(PLACES, size, PLACES, 3).sum((0, 2))
-            means.append(values / weight.reshape(PLACES, size, PLACES).sum((0, 2))[..., None])
-    return np.stack(means).reshape(6, len(rows), size, 3)
+            values = image[face, line, column] * weight[..., None]
+            sums = values.reshape(PLACES, size, PLACES, 3).sum((0, 2))
+            means.append(sums / weight.reshape(PLACES, size, PLACES).sum((0, 2))[..., None])
+    return np.stack(means).reshape(-1, len(rows), size, 3)
 
 
 def mean_background(projection: str, width: int, height: int, face: int = 0) -> NDArray[np.float64]:
@@ -240,7 +243,7 @@ def to_cubes(
 def synthetic_conversions() -> Iterator[Case]:
     source = panorama(1024, lights=True)
     rows = range(128 - SUBSET // 2, 128 + SUBSET // 2)
-    yield from to_cubes("lights", source, 256, mean_over_texels(source, 256, rows), rows, 0.02)
+    yield from to_cubes("lights", source, 256, mean_over_texels(source, "cube", 256, rows), rows, 0.02)
     flux = float(np.abs(source.resample("cube", 256).flux() / source.flux() - 1).max())
     require(flux < 1e-4, f"flux of the cube is off by {flux:.2g}")
     source = panorama(1024, lights=False)
@@ -252,9 +255,10 @@ def real_conversions() -> Iterator[Case]:
     source = real_panorama()
     if source is None:
         return
-    yield from to_cubes("real", source, 64, mean_over_texels(source, 64, range(64)), range(64), 0.05)
+    yield from to_cubes("real", source, 64, mean_over_texels(source, "cube", 64, range(64)), range(64), 0.05)
     rows = range(128 - SUBSET // 2, 128 + SUBSET // 2)
-    yield from to_cubes("real, halved,", halved(source), 256, mean_over_texels(source, 256, rows), rows, 0.5)
+    expected = mean_over_texels(source, "cube", 256, rows)
+    yield from to_cubes("real, halved,", halved(source), 256, expected, rows, 0.5)
 
 
 def back_to_a_panorama() -> Iterator[Case]:
@@ -284,31 +288,60 @@ def back_to_a_panorama() -> Iterator[Case]:
         yield Case(case, "ms", ours, 1e3 * seconds(peer, 2), "skylibs", error_ours, error_peer)
 
 
-def to_round_maps() -> Iterator[Case]:
-    cube = panorama(1024, lights=False).resample("cube", 256)
-    size = 256
+def to_paraboloids(
+    name: str, cube: EnvMap, expected: NDArray[np.floating], rows: range, limit: float
+) -> Iterator[Case]:
+    """A cube to paraboloids, `expected` in some rows of both."""
+    size, part, source_size = 256, slice(rows.start, rows.stop), cube.layout.width
     d = np.stack([texel_directions("dual_paraboloid", size, size, face) for face in (0, 1)])
-    expected = np.stack([mean_background("dual_paraboloid", size, size, face) for face in (0, 1)])
 
     def peer() -> FloatArray:
         face, points = points_from_directions("cube", d)
-        at = np.stack(
-            [face.ravel(), (1 - points[..., 1]).ravel() * 128 - 0.5, (points[..., 0] + 1).ravel() * 128 - 0.5]
-        )
+        half = source_size / 2
+        line = (1 - points[..., 1]) * half - 0.5
+        column = (points[..., 0] + 1) * half - 0.5
+        at = np.stack([face.ravel(), line.ravel(), column.ravel()])
         channels = [
             scipy.ndimage.map_coordinates(c, at, order=1, mode="nearest")
             for c in np.moveaxis(cube.level(), -1, 0)
         ]
         return np.stack(channels, axis=-1).reshape(d.shape)
 
-    errors = (
-        relative_l2(cube.resample("dual_paraboloid", size).level(), expected),
-        relative_l2(peer(), expected),
-    )
-    require(max(errors) < 0.02, f"cube to dual paraboloid: {errors}")
-    ours = 1e3 * seconds(lambda: cube.resample("dual_paraboloid", size), 5)
-    name = "SciPy map_coordinates, bilinear (neither peer has it)"
-    yield Case("cube 256 to dual paraboloid 256", "ms", ours, 1e3 * seconds(peer, 3), name, *errors)
+    def error(paraboloids: FloatArray) -> float:
+        return relative_l2(paraboloids[:, part], expected)
+
+    time_peer = 1e3 * seconds(peer, 3)
+    for filter in ("automatic", "bilinear"):
+
+        def ours(filter: str = filter) -> EnvMap:
+            return cube.resample("dual_paraboloid", size, filter=filter)
+
+        error_ours = error(ours().level())
+        require(filter != "automatic" or error_ours < limit, f"{name}: relative error {error_ours:.2g}")
+        yield Case(
+            f"{name} cube {source_size} to dual paraboloid {size}, {filter}",
+            "ms",
+            1e3 * seconds(ours, 5),
+            time_peer,
+            "SciPy map_coordinates, bilinear (neither peer has it)",
+            error_ours,
+            error(peer()),
+        )
+
+
+def to_round_maps() -> Iterator[Case]:
+    rows = range(128 - SUBSET // 2, 128 + SUBSET // 2)
+    cube = panorama(1024, lights=True).resample("cube", 256)
+    expected = mean_over_texels(cube, "dual_paraboloid", 256, rows)
+    yield from to_paraboloids("lights,", cube, expected, rows, 0.02)
+    real = real_panorama()
+    if real is not None:
+        cube = real.resample("cube", 128)
+        expected = mean_over_texels(cube, "dual_paraboloid", 256, rows)
+        yield from to_paraboloids("real,", cube, expected, rows, 0.05)
+    cube = panorama(1024, lights=False).resample("cube", 256)
+    expected = np.stack([mean_background("dual_paraboloid", 256, 256, face) for face in (0, 1)])
+    yield from to_paraboloids("smooth,", cube, expected, range(256), 0.02)
     if SKYLIBS is None:
         return
     source = panorama(512, lights=False)

@@ -303,7 +303,7 @@ struct Resampler::Plan {
   Plan(const EnvMapLayout& source, const EnvMapLayout& target, const ResampleOptions& options)
       : job(source, target, options),
         symmetries(shared_symmetries(job.source, job.target, options.source_from_target)),
-        lines(line_tables(job)),
+        lines(job.target),
         tiles(tiles_of(job, symmetries)) {}
 
   void keep_taps(std::size_t max_bytes) {
@@ -345,7 +345,7 @@ struct Resampler::Plan {
 
   ResampleJob job;
   std::vector<SharedSymmetry> symmetries;
-  LineTables lines;
+  TexelLines lines;
   std::vector<Tile> tiles;
   std::vector<std::optional<TapChunk>> chunks;  // of the tiles, those that are kept
   std::size_t bytes = 0;

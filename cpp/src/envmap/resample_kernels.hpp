@@ -15,7 +15,7 @@ struct PositionArrays {
 };
 
 /// What a texel of the target takes.
-enum : std::uint8_t { kArea = 1, kInterpolate = 2, kBlend = 3, kIrregular = 4 };
+enum : std::uint8_t { kArea = 1, kInterpolate = 2, kBlend = 3, kIrregular = 4, kAtCenter = 5 };
 
 /// When the edges of a texel's image in the source may be taken for straight: b, by which it deviates from a
 /// parallelogram, is below a tenth of a texel or `per_length` of its length, and |b × p| + |b × q| is below

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
 namespace mirrorbake {
 namespace {
 
@@ -50,11 +53,9 @@ std::uint16_t narrow(int index) { return static_cast<std::uint16_t>(index); }
 
 }  // namespace
 
-LineTables line_tables(const ResampleJob& job) {
-  const int width = job.target.width;
-  return {job.target.projection,
-          looks_at_centers(job.filter) ? center_coordinates(width) : side_coordinates(width)};
-}
+TexelLines::TexelLines(const EnvMapLayout& target)
+    : corners(target.projection, side_coordinates(target.width)),
+      centers(target.projection, center_coordinates(target.width)) {}
 
 std::size_t TapChunk::bytes() const {
   const auto size = [](const auto& vector) { return vector.size() * sizeof(vector[0]); };
@@ -77,13 +78,14 @@ bool may_have_first_texels(const Tile& tile, std::span<const SharedSymmetry> sym
   });
 }
 
-TapBuilder::TapBuilder(const ResampleJob& job, const LineTables& lines,
+TapBuilder::TapBuilder(const ResampleJob& job, const TexelLines& lines,
                        std::span<const SharedSymmetry> symmetries)
     : job_(job),
       kernels_(resample_kernels()),
       symmetries_(symmetries),
       limits_(straight_limits(job.source, job.target)),
-      lookup_(job, lines),
+      corner_lookup_(job, lines.corners),
+      center_lookup_(job, lines.centers),
       irregular_(job) {}
 
 void TapBuilder::build(const Tile& tile, TapChunk& chunk) {
@@ -96,10 +98,11 @@ void TapBuilder::build(const Tile& tile, TapChunk& chunk) {
   left_.resize(size);
   top_.resize(size);
   box_shapes_.resize(size);
-  positions_.resize(size);
+  centers_.resize(size);
   if (looks_at_centers(job_.filter)) {
-    find_centers();
+    look_at_centers();
   } else {
+    positions_.resize(size);
     find_corners();
     classify();
   }
@@ -117,11 +120,13 @@ bool TapBuilder::select_first_texels(const Tile& tile) {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(tile.columns) +
            static_cast<std::size_t>(column);
   };
-  for (const SharedSymmetry& symmetry : symmetries_) {
+  bool all_are_first = true;
+  for (const SharedSymmetry& symmetry : symmetries_.subspan(1)) {  // but for the identity
     const TexelMap& map = symmetry.target;
     const Order order = order_of_image(tile, map);
     if (order == Order::before) return false;
     if (order == Order::after) continue;
+    all_are_first = false;
     const FaceMap& to = map.faces[static_cast<std::size_t>(tile.face)];
     std::uint8_t* first = first_.data();
     for (int row = tile.row; row < tile.row + tile.rows; ++row) {
@@ -136,6 +141,7 @@ bool TapBuilder::select_first_texels(const Tile& tile) {
       }
     }
   }
+  if (all_are_first) return true;
   Range rows{tile.rows, -1};
   Range columns{tile.columns, -1};
   for (int row = 0; row < tile.rows; ++row) {
@@ -173,8 +179,8 @@ Quad TapBuilder::quad(std::size_t texel) const {
 
 void TapBuilder::find_corners() {
   for (int row = 0; row <= tile_.rows; ++row) {
-    lookup_.find(tile_.face, target_corner(row, 0).y, tile_.column,
-                 static_cast<std::size_t>(tile_.columns) + 1, positions_, corner(row, 0));
+    corner_lookup_.find(tile_.face, target_corner(row, 0).y, tile_.column,
+                        static_cast<std::size_t>(tile_.columns) + 1, positions_, corner(row, 0));
   }
   if (!job_.is_periodic()) return;
   // A panorama's columns go on across its seam, so that neighbours are never half a turn apart.
@@ -196,6 +202,7 @@ void TapBuilder::classify() {
   const ProjectionKind kind = job_.target.projection.kind;
   const bool on_rim = disc_extent(kind, target_corner(0, 0), target_corner(tile_.rows, tile_.columns)) ==
                       DiscExtent::crosses_rim;
+  const bool may_be_beyond = may_reach_beyond_rim();
   for (int row = 0; row < tile_.rows; ++row) {
     const std::size_t first = corner(row, 0);
     const PositionArrays above = positions_.from(first);
@@ -210,6 +217,11 @@ void TapBuilder::classify() {
     }
     if (job_.projection().kind == ProjectionKind::sphere_map) fade_interpolation(row);
     kernels_.find_boxes(above, below, kinds_.data() + first, columns, face, boxes_from(first));
+    if (!may_be_beyond) continue;
+    find_centers(row);
+    for (int column = 0; column < tile_.columns; ++column) {
+      if (is_beyond_rim(row, column)) look_at_center(corner(row, column));
+    }
   }
 }
 
@@ -223,29 +235,48 @@ void TapBuilder::fade_interpolation(int row) {
   }
 }
 
-// A texel of the filter `bilinear` is made from those around its centre, one of `nearest` from that at its centre.
-void TapBuilder::find_centers() {
-  const bool nearest = job_.filter == ResampleFilter::nearest;
+// Two texels beyond the rim of an angular map or a fisheye are only there for those who look up along the rim.
+bool TapBuilder::is_beyond_rim(int row, int column) const {
+  const glm::dvec2 a = glm::abs(target_corner(row, column));
+  const glm::dvec2 b = glm::abs(target_corner(row + 1, column + 1));
+  return glm::length(glm::min(a, b)) > 1.0 + 4.0 / job_.target.width;
+}
+
+bool TapBuilder::may_reach_beyond_rim() const {
+  const ProjectionKind kind = job_.target.projection.kind;
+  if (kind != ProjectionKind::angular && kind != ProjectionKind::fisheye) return false;
+  return glm::length(glm::max(glm::abs(target_corner(0, 0)),
+                              glm::abs(target_corner(tile_.rows, tile_.columns)))) > 1.0;
+}
+
+void TapBuilder::look_at_centers() {
   for (int row = 0; row < tile_.rows; ++row) {
-    lookup_.find(tile_.face, row_center(tile_.row + row, job_.target.height), tile_.column,
-                 static_cast<std::size_t>(tile_.columns), positions_, corner(row, 0));
-    for (int column = 0; column < tile_.columns; ++column) {
-      const std::size_t i = corner(row, column);
-      const int size = nearest ? 1 : 2;
-      if (nearest) {
-        left_[i] = std::min(static_cast<int>(positions_.x[i]), job_.width() - 1);
-        top_[i] = std::min(static_cast<int>(positions_.y[i]), job_.height() - 1);
-      } else {
-        left_[i] = floor_of(positions_.x[i] - 0.5);
-        top_[i] = floor_of(positions_.y[i] - 0.5);
-      }
-      const bool beside = left_[i] < 0 || left_[i] + size > job_.width();
-      const bool fits = positions_.face[i] >= 0 && top_[i] >= 0 && top_[i] + size <= job_.height() &&
-                        size <= job_.width() && (job_.is_periodic() || !beside);
-      const std::uint32_t length = static_cast<std::uint32_t>(size);
-      box_shapes_[i] = fits ? pack({length, length, positions_.face[i], kInterpolate}) : 0U;
-    }
+    find_centers(row);
+    for (std::size_t i = corner(row, 0); i < corner(row, tile_.columns); ++i) look_at_center(i);
   }
+}
+
+void TapBuilder::find_centers(int row) {
+  center_lookup_.find(tile_.face, row_center(tile_.row + row, job_.target.height), tile_.column,
+                      static_cast<std::size_t>(tile_.columns), centers_, corner(row, 0));
+}
+
+// Makes a texel from those around its centre, or from that at its centre.
+void TapBuilder::look_at_center(std::size_t texel) {
+  kinds_[texel] = kAtCenter;
+  const double x = centers_.x[texel];
+  const double y = centers_.y[texel];
+  const bool nearest = job_.filter == ResampleFilter::nearest;
+  const int size = nearest ? 1 : 2;
+  const int left = nearest ? std::min(static_cast<int>(x), job_.width() - 1) : floor_of(x - 0.5);
+  const int top = nearest ? std::min(static_cast<int>(y), job_.height() - 1) : floor_of(y - 0.5);
+  const bool beside = left < 0 || left + size > job_.width();
+  const bool fits = centers_.face[texel] >= 0 && top >= 0 && top + size <= job_.height() &&
+                    size <= job_.width() && (job_.is_periodic() || !beside);
+  const std::uint32_t length = static_cast<std::uint32_t>(size);
+  left_[texel] = left;
+  top_[texel] = top;
+  box_shapes_[texel] = fits ? pack({length, length, centers_.face[texel], kAtCenter}) : 0U;
 }
 
 void TapBuilder::find_blocks(TapChunk& chunk) {
@@ -321,7 +352,7 @@ void TapBuilder::weigh_blocks(TapChunk::Blocks& blocks) {
   const std::uint32_t* texels = sorted_.data();
   for (std::size_t k = 0; k < shapes_.size(); ++k) {
     const BoxShape shape = unpack(shapes_[k]);
-    if (looks_at_centers(job_.filter)) {
+    if (shape.kind == kAtCenter) {
       interpolate_at_centers({texels, counts_[k]}, weights);
     } else {
       kernels_.find_weights(tile, boxes_from(0), source, shape, texels, counts_[k], weights);
@@ -337,8 +368,8 @@ void TapBuilder::interpolate_at_centers(std::span<const std::uint32_t> texels, f
       *weights++ = 1.0F;
       continue;
     }
-    const double x = positions_.x[i] - 0.5 - left_[i];
-    const double y = positions_.y[i] - 0.5 - top_[i];
+    const double x = centers_.x[i] - 0.5 - left_[i];
+    const double y = centers_.y[i] - 0.5 - top_[i];
     for (const double down : {1.0 - y, y}) {
       *weights++ = static_cast<float>((1.0 - x) * down);
       *weights++ = static_cast<float>(x * down);
@@ -348,7 +379,6 @@ void TapBuilder::interpolate_at_centers(std::span<const std::uint32_t> texels, f
 
 void TapBuilder::add_list(int row, int column, TapChunk& chunk) {
   const std::size_t i = corner(row, column);
-  const int face = positions_.face[i];
   TapChunk::Lists& lists = chunk.lists;
   const std::size_t before = lists.weights.size();
   const auto add = [&](const TexelPlace& texel, double weight) {
@@ -357,13 +387,14 @@ void TapBuilder::add_list(int row, int column, TapChunk& chunk) {
     lists.columns.push_back(narrow(texel.column));
     lists.weights.push_back(static_cast<float>(weight));
   };
-  if (looks_at_centers(job_.filter)) {
-    if (face >= 0) emit_bilinear(job_.source, face, positions_.x[i], positions_.y[i], add);
+  if (kinds_[i] == kAtCenter) {
+    const int face = centers_.face[i];
+    if (face >= 0) emit_bilinear(job_.source, face, centers_.x[i], centers_.y[i], add);
   } else {
     const auto taps =
         kinds_[i] == kIrregular
             ? irregular_.find(tile_.face, target_corner(row, column), target_corner(row + 1, column + 1))
-            : irregular_.find_straight(face, quad(i), static_cast<double>(shares_[i]));
+            : irregular_.find_straight(positions_.face[i], quad(i), static_cast<double>(shares_[i]));
     if (!taps) {
       chunk.giants.push_back({tile_.face, tile_.row + row, tile_.column + column});
       return;

@@ -57,15 +57,20 @@ struct TapChunk {
 /// Whether a tile may have texels that are the first of those that symmetries take to each other.
 bool may_have_first_texels(const Tile& tile, std::span<const SharedSymmetry> symmetries);
 
-/// What a TapBuilder for this job looks up along lines.
-LineTables line_tables(const ResampleJob& job);
+/// What a TapBuilder looks up along lines: corners of texels and their centres.
+struct TexelLines {
+  explicit TexelLines(const EnvMapLayout& target);
+
+  LineTables corners;
+  LineTables centers;
+};
 
 /// Finds taps tile by tile. Positions and kinds of texels come from vectorised loops; then every texel's image
 /// in the source, a quadrilateral, is laid over the texels of the source.
 class TapBuilder {
  public:
   /// Keeps references to what it is given.
-  TapBuilder(const ResampleJob& job, const LineTables& lines, std::span<const SharedSymmetry> symmetries);
+  TapBuilder(const ResampleJob& job, const TexelLines& lines, std::span<const SharedSymmetry> symmetries);
 
   void build(const Tile& tile, TapChunk& chunk);
 
@@ -91,7 +96,11 @@ class TapBuilder {
   void find_corners();
   void classify();
   void fade_interpolation(int row);
-  void find_centers();
+  void look_at_centers();
+  void find_centers(int row);
+  void look_at_center(std::size_t texel);
+  bool may_reach_beyond_rim() const;
+  bool is_beyond_rim(int row, int column) const;
   void find_blocks(TapChunk& chunk);
   void sort_blocks(TapChunk::Blocks& blocks);
   void weigh_blocks(TapChunk::Blocks& blocks);
@@ -102,12 +111,14 @@ class TapBuilder {
   const ResampleKernels& kernels_;
   const std::span<const SharedSymmetry> symmetries_;
   const StraightLimits limits_;
-  LineLookup lookup_;
+  LineLookup corner_lookup_;
+  LineLookup center_lookup_;
   IrregularTexels irregular_;
 
   Tile tile_;
   std::vector<std::uint8_t> first_;  // of those that symmetries take to each other
-  Positions positions_;              // of corners, or of centres
+  Positions positions_;              // of corners
+  Positions centers_;
   std::vector<std::uint8_t> kinds_;
   std::vector<float> shares_;
   std::vector<std::int32_t> left_, top_;

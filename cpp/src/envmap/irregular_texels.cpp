@@ -57,10 +57,10 @@ StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& t
   constexpr double kAny = std::numeric_limits<double>::max();
   switch (source.projection.kind) {
     // Around the poles of a panorama images are long and bent along their length. Straight edges n texels of the target
-    // away from one shift 1/(12 n) of the area, which is lost or counted twice beside a texel that is traced. In angular
-    // maps, which have few symmetries to share the work, no more flux is lost with 0.1.
+    // away from one shift 1/(12 n) of the area, which is lost or counted twice beside a texel that is traced. Towards the
+    // rim of a sphere map all images are so.
     case ProjectionKind::latlong:
-      return {target.projection.kind == ProjectionKind::angular ? 0.1 : 0.03, kAny, length};
+      return {target.projection.kind == ProjectionKind::sphere_map ? 0.03 : 0.1, kAny, length};
     case ProjectionKind::cube:
     case ProjectionKind::dual_paraboloid: return {0.01, kAny, length};
     // Along a rim that is a single direction they are slivers, which a small bend empties.

@@ -60,13 +60,13 @@ void check_texels(const char* name, const EnvMapLayout& layout) {
 
 // Tiles of the target that have texels to find taps for.
 std::vector<Tile> tiles_of(const ResampleJob& job, std::span<const SharedSymmetry> symmetries) {
-  // Tiles that read some 64² texels of the source, as far as these are spread evenly, and wider than high, since
+  // Tiles that read some 90² texels of the source, as far as these are spread evenly, and wider than high, since
   // most symmetries take rows to rows; of small maps small ones, so that every thread gets some.
   constexpr int kAspect = 4;
   const double texels = static_cast<double>(job.target.level_texels(0));
   const double ratio = std::sqrt(static_cast<double>(job.source.level_texels(0)) / texels);
-  const double most = std::sqrt(texels / static_cast<double>(symmetries.size()) / 32.0);
-  const int down = static_cast<int>(std::clamp(std::min(32.0 / ratio, most), 1.0, 12.0));
+  const double most = std::sqrt(texels / static_cast<double>(symmetries.size()) / 16.0);
+  const int down = static_cast<int>(std::clamp(std::min(45.0 / ratio, most), 1.0, 16.0));
   const int across = kAspect * down;
   std::vector<Tile> tiles;
   for (int face = 0; face < face_count(job.target.projection); ++face) {

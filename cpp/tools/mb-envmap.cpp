@@ -26,6 +26,7 @@
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/envmap/sampling.hpp"
+#include "mirrorbake/image/image_io.hpp"
 #include "tool.hpp"
 
 namespace {
@@ -401,6 +402,7 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   const ThreadLimit limit(threads);
+  set_exr_threads(thread_count());
   if (*info_command) print_info(info, json);
   if (*convert_command) convert.run(json);
   if (*mips_command) write_mips(mips_input.load(), parse_mip_filter(mip_filter), mips_output, json);

@@ -567,6 +567,7 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   const ThreadLimit limit(threads);
+  set_exr_threads(thread_count());
   if (*beauty_command) beauty.run(json);
   if (*layers_command) layers.run(json);
   if (*capture_command) capture.run(json);

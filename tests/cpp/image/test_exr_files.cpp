@@ -373,10 +373,13 @@ TEST_F(ExrFiles, AreTheSameBytesOnAnyNumberOfThreads) {
   Image image(64, 300, {"R", "G", "B"});
   for (std::size_t i = 0; i < image.pixels.size(); ++i)
     image.pixels[i] = unit_float(std::uint32_t(hash64(i)));
-  save_image(path("many.exr"), image);
-  const ThreadLimit one(1);
-  save_image(path("one.exr"), image);
-  EXPECT_EQ(bytes_of(path("many.exr")), bytes_of(path("one.exr")));
+  save_image(path("none.exr"), image);
+  set_exr_threads(3);
+  save_image(path("three.exr"), image);
+  set_exr_threads(0);
+  EXPECT_EQ(bytes_of(path("none.exr")), bytes_of(path("three.exr")));
+  EXPECT_THROW(set_exr_threads(-1), InvalidArgument);
+  EXPECT_THROW(set_exr_threads(1025), InvalidArgument);
 }
 
 TEST_F(ExrFiles, AChannelNameThatTheFormatCannotHoldIsAnErrorAndLeavesNothing) {

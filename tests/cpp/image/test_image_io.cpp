@@ -255,6 +255,22 @@ TEST_F(ImageFiles, FullDiskLeavesNothingAndIsAnErrorInEveryFormat) {
   EXPECT_EQ(files(), 5u);
 }
 
+// OpenEXR says nothing of bytes that it writes when it is done.
+TEST_F(ImageFiles, AnExrThatLacksRoomForItsLastByteIsAnError) {
+  const Image image = ramp(40, 30, {"R", "G", "B"}, 1.0F);
+  save_image(path("a.exr"), image);
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit small = before;
+  small.rlim_cur = std::filesystem::file_size(path("a.exr")) - 1;
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  EXPECT_THROW(save_image(path("b.exr"), image), FileError);
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(files(), 1u);
+}
+
 TEST_F(ImageFiles, DamagedPngIsAnErrorOfOneLineAndPrintsNothing) {
   save_image(path("a.png"), ramp(40, 30, {"R", "G", "B"}, 1.0F));
   std::ifstream in(path("a.png"), std::ios::binary);

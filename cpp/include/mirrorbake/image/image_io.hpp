@@ -86,6 +86,10 @@ SaveReport save_image(const std::string& path, const Image& image,
 SaveReport save_image(const std::string& path, int width, int height, std::span<const std::string> channels,
                       std::span<const float> pixels, PixelFormat format = PixelFormat::automatic);
 
+/// Lets EXR files be packed on so many threads of OpenEXR's, 0 to 1024; none until it is called. They are one pool for the
+/// whole process and do not survive fork(): a program's choice. Throws InvalidArgument.
+void set_exr_threads(int threads);
+
 /// Names of 1 to 4 channels: Y; Y, A; R, G, B; R, G, B, A. Throws InvalidArgument for any other count.
 std::vector<std::string> default_channels(int count);
 

@@ -35,6 +35,8 @@ from mirrorbake.projection import directions_from_points, points_from_directions
 FloatArray = NDArray[np.float32]
 Convert = Callable[[], FloatArray]
 PLACES = 24
+# Runs of which the shortest counts: a clock that changes takes as long over ours as over theirs.
+OUR_RUNS, PEER_RUNS = 25, 4
 SUBSET = 32  # rows of each face that the reference looks at
 
 
@@ -205,9 +207,9 @@ def to_cubes(
         return lambda: source.resample("cube", size, filter=filter)
 
     resampler = Resampler(source, "cube", size)
-    times = {f: 1e3 * seconds(ours(f), 5) for f in ("automatic", "bilinear")}
+    times = {f: 1e3 * seconds(ours(f), OUR_RUNS) for f in ("automatic", "bilinear")}
     errors = {f: error(ours(f)().level()) for f in times}
-    times["automatic, kept"] = 1e3 * seconds(lambda: resampler.apply(source), 5)
+    times["automatic, kept"] = 1e3 * seconds(lambda: resampler.apply(source), OUR_RUNS)
     errors["automatic, kept"] = error(resampler.apply(source).level())
     require(errors["automatic"] < limit, f"{name}: relative error {errors['automatic']:.2g}")
     case = f"{name} {width}x{height} to cube {size}"
@@ -218,7 +220,7 @@ def to_cubes(
             return np.asarray(convert(image, size, mode="bilinear", cube_format="list"))
 
         error_peer = error(as_our_cube(peer()))
-        first, again = 1e3 * first_seconds(peer, 3), 1e3 * seconds(peer, 3)
+        first, again = 1e3 * first_seconds(peer, PEER_RUNS), 1e3 * seconds(peer, PEER_RUNS)
         for filter, our_time in times.items():
             for kind, time_peer in (("first", first), ("again", again)):
                 if kind == "first" and "kept" in filter:
@@ -235,7 +237,7 @@ def to_cubes(
     if SKYLIBS is not None:
         peer = skylibs_convert(image, "latlong", "cube", 4 * size)
         error_peer = error(peer()[cross_index(size)])
-        time_peer = 1e3 * seconds(peer, 2)
+        time_peer = 1e3 * seconds(peer, PEER_RUNS)
         for filter, our_time in times.items():
             yield Case(f"{case}, {filter}", "ms", our_time, time_peer, "skylibs", errors[filter], error_peer)
 
@@ -264,7 +266,7 @@ def real_conversions() -> Iterator[Case]:
 def back_to_a_panorama() -> Iterator[Case]:
     cube = panorama(1024, lights=False).resample("cube", 256)
     expected = mean_background("latlong", 1024, 512)
-    ours = 1e3 * seconds(lambda: cube.resample("latlong", 512), 5)
+    ours = 1e3 * seconds(lambda: cube.resample("latlong", 512), OUR_RUNS)
     error_ours = relative_l2(cube.resample("latlong", 512).level(), expected)
     require(error_ours < 0.02, f"cube to latlong: {error_ours}")
     case = "cube 256 to latlong 1024x512"
@@ -277,7 +279,10 @@ def back_to_a_panorama() -> Iterator[Case]:
 
         error_peer = relative_l2(peer(), expected)
         require(error_peer < 0.02, f"cube to latlong, py360convert: {error_peer}")
-        for kind, time_peer in (("first", first_seconds(peer, 3)), ("again", seconds(peer, 3))):
+        for kind, time_peer in (
+            ("first", first_seconds(peer, PEER_RUNS)),
+            ("again", seconds(peer, PEER_RUNS)),
+        ):
             yield Case(case, "ms", ours, 1e3 * time_peer, f"py360convert {kind}", error_ours, error_peer)
     if SKYLIBS is not None:
         cross = np.zeros((1024, 768, 3), np.float32)
@@ -285,7 +290,7 @@ def back_to_a_panorama() -> Iterator[Case]:
         peer = skylibs_convert(cross, "cube", "latlong", 512)
         error_peer = relative_l2(peer(), expected)
         require(error_peer < 0.05, f"cube to latlong, skylibs: {error_peer}")
-        yield Case(case, "ms", ours, 1e3 * seconds(peer, 2), "skylibs", error_ours, error_peer)
+        yield Case(case, "ms", ours, 1e3 * seconds(peer, PEER_RUNS), "skylibs", error_ours, error_peer)
 
 
 def to_paraboloids(
@@ -310,7 +315,7 @@ def to_paraboloids(
     def error(paraboloids: FloatArray) -> float:
         return relative_l2(paraboloids[:, part], expected)
 
-    time_peer = 1e3 * seconds(peer, 3)
+    time_peer = 1e3 * seconds(peer, PEER_RUNS)
     for filter in ("automatic", "bilinear"):
 
         def ours(filter: str = filter) -> EnvMap:
@@ -321,7 +326,7 @@ def to_paraboloids(
         yield Case(
             f"{name} cube {source_size} to dual paraboloid {size}, {filter}",
             "ms",
-            1e3 * seconds(ours, 5),
+            1e3 * seconds(ours, OUR_RUNS),
             time_peer,
             "SciPy map_coordinates, bilinear (neither peer has it)",
             error_ours,
@@ -354,8 +359,10 @@ def to_round_maps() -> Iterator[Case]:
         relative_l2(convert()[disc], expected),
     )
     require(max(errors) < 0.05, f"latlong to angular: {errors}")
-    ours = 1e3 * seconds(lambda: source.resample("angular", 512), 5)
-    yield Case("latlong 1024x512 to angular 512", "ms", ours, 1e3 * seconds(convert, 2), "skylibs", *errors)
+    ours = 1e3 * seconds(lambda: source.resample("angular", 512), OUR_RUNS)
+    yield Case(
+        "latlong 1024x512 to angular 512", "ms", ours, 1e3 * seconds(convert, PEER_RUNS), "skylibs", *errors
+    )
 
 
 def lookups() -> Iterator[Case]:
@@ -387,8 +394,8 @@ def lookups() -> Iterator[Case]:
         yield Case(
             case=f"200k {filter} lookups",
             unit="ns per lookup",
-            ours=1e9 / len(d) * seconds(ours, 3),
-            peer=1e9 / len(d) * seconds(peer, 3),
+            ours=1e9 / len(d) * seconds(ours, OUR_RUNS),
+            peer=1e9 / len(d) * seconds(peer, PEER_RUNS),
             peer_name="SciPy map_coordinates, bilinear",
             error_ours=errors[0],
             error_peer=errors[1],
@@ -439,7 +446,7 @@ def file_to_file() -> Iterator[Case]:
             yield Case(
                 "latlong 2048x1024 to 1024x512, without files",
                 "ms",
-                1e3 * seconds(lambda: source.resample("latlong", 512), 5),
+                1e3 * seconds(lambda: source.resample("latlong", 512), OUR_RUNS),
                 resizing_milliseconds(oiiotool, path, theirs),
                 "oiiotool --resize, its own figure",
                 *errors,

@@ -315,7 +315,7 @@ def to_paraboloids(
     def error(paraboloids: FloatArray) -> float:
         return relative_l2(paraboloids[:, part], expected)
 
-    time_peer = 1e3 * seconds(peer, PEER_RUNS)
+    time_peer, error_peer = 1e3 * seconds(peer, PEER_RUNS), error(peer())
     for filter in ("automatic", "bilinear"):
 
         def ours(filter: str = filter) -> EnvMap:
@@ -330,7 +330,7 @@ def to_paraboloids(
             time_peer,
             "SciPy map_coordinates, bilinear (neither peer has it)",
             error_ours,
-            error(peer()),
+            error_peer,
         )
 
 

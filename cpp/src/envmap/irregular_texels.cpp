@@ -92,10 +92,9 @@ double interpolated_share(double side) {
   return share * share * (3.0 - 2.0 * share);
 }
 
-double interpolable(const EnvMapLayout& source, glm::dvec2 position) {
-  if (source.projection.kind != ProjectionKind::sphere_map) return 1.0;
+double interpolable(const EnvMapLayout& sphere_map, glm::dvec2 position) {
   // Over a quarter of the radius, but no less than sixteen texels: the smoother, the less flux it moves.
-  const double radius = 0.5 * source.width;
+  const double radius = 0.5 * sphere_map.width;
   const double from_rim = radius - 1.0 - glm::length(position - radius);
   const double t = std::clamp(from_rim / std::max(16.0, 0.25 * radius), 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
@@ -165,8 +164,10 @@ std::optional<std::span<const Tap>> IrregularTexels::find(int face, glm::dvec2 l
   clipped_ = disc_extent(job_.target.projection.kind, low, high) == DiscExtent::crosses_rim;
   double share = 0.0;
   if (job_.filter == ResampleFilter::automatic) {
-    share = interpolated_share(texels_across(face, low, high)) *
-            interpolable(job_.source, corner(face, middle.x, middle.y).position);
+    share = interpolated_share(texels_across(face, low, high));
+    if (share > 0.0 && job_.projection().kind == ProjectionKind::sphere_map) {
+      share *= interpolable(job_.source, corner(face, middle.x, middle.y).position);
+    }
   }
   for (const Content content : {Content::constant_texels, Content::interpolated}) {
     const double part = content == Content::interpolated ? share : 1.0 - share;

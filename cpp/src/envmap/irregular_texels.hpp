@@ -29,9 +29,9 @@ double texel_side(double area, double squares);
 /// of the source nothing is left to alias, so that the change is quick.
 double interpolated_share(double side);
 
-/// How much of that is left at a place of the source, in texels: all but near the rim of a sphere map, where the next texel
-/// may be beyond it, and interpolation would hand flux out to what has none.
-double interpolable(const EnvMapLayout& source, glm::dvec2 position);
+/// How much of that is left at a place of a sphere map as source, in texels: less near its rim, where the next texel may be
+/// beyond it, and interpolation would hand flux out to what has none.
+double interpolable(const EnvMapLayout& sphere_map, glm::dvec2 position);
 
 /// Texels whose image in the source is not a quadrilateral on one face: around poles and other singularities,
 /// across the edges of faces, on the rim of a round map, or large. In a panorama the outline of the image is traced

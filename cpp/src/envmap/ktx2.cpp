@@ -225,16 +225,12 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map, PixelFormat
     out.bytes.reserve(begin + values.size() / static_cast<std::size_t>(layout.channels) * texel_bytes);
     for (std::size_t i = 0; i < values.size(); i += static_cast<std::size_t>(layout.channels)) {
       for (std::size_t c = 0; c < static_cast<std::size_t>(stored); ++c) {
-        float v = c < static_cast<std::size_t>(layout.channels) ? values[i + c] : 1.0F;
+        const float v = c < static_cast<std::size_t>(layout.channels) ? values[i + c] : 1.0F;
         if (whole) {
           out.put(v);
           continue;
         }
-        if (std::abs(v) > 65504.0F) {
-          v = std::copysign(65504.0F, v);
-          ++report.clamped_to_half;
-        }
-        out.put(half_from_float(v));
+        out.put(half_from_float(clamp_to_half(v, report.clamped_to_half)));
       }
     }
     const std::size_t entry = kHeaderBytes + kLevelBytes * static_cast<std::size_t>(level);

@@ -303,7 +303,7 @@ struct Resampler::Plan {
   Plan(const EnvMapLayout& source, const EnvMapLayout& target, const ResampleOptions& options)
       : job(source, target, options),
         symmetries(shared_symmetries(job.source, job.target, options.source_from_target)),
-        lines(job.target),
+        lines(job),
         tiles(tiles_of(job, symmetries)) {}
 
   void keep_taps(std::size_t max_bytes) {

@@ -48,14 +48,23 @@ bool looks_at_centers(ResampleFilter filter) {
   return filter == ResampleFilter::bilinear || filter == ResampleFilter::nearest;
 }
 
+// Whether there are texels beyond a rim that may be interpolated.
+bool goes_on_beyond_rim(ProjectionKind kind) {
+  return kind == ProjectionKind::angular || kind == ProjectionKind::fisheye;
+}
+
 // Maps have at most 65536 rows and columns.
 std::uint16_t narrow(int index) { return static_cast<std::uint16_t>(index); }
 
 }  // namespace
 
-TexelLines::TexelLines(const EnvMapLayout& target)
-    : corners(target.projection, side_coordinates(target.width)),
-      centers(target.projection, center_coordinates(target.width)) {}
+TexelLines::TexelLines(const ResampleJob& job)
+    : corners(job.target.projection,
+              looks_at_centers(job.filter) ? std::vector<double>() : side_coordinates(job.target.width)),
+      centers(job.target.projection,
+              looks_at_centers(job.filter) || goes_on_beyond_rim(job.target.projection.kind)
+                  ? center_coordinates(job.target.width)
+                  : std::vector<double>()) {}
 
 std::size_t TapChunk::bytes() const {
   const auto size = [](const auto& vector) { return vector.size() * sizeof(vector[0]); };
@@ -235,7 +244,7 @@ void TapBuilder::fade_interpolation(int row) {
   }
 }
 
-// Two texels beyond the rim of an angular map or a fisheye are only there for those who look up along the rim.
+// Texels beyond the rim have no solid angle; those that lookups along the rim read are made like all others.
 bool TapBuilder::is_beyond_rim(int row, int column) const {
   const glm::dvec2 a = glm::abs(target_corner(row, column));
   const glm::dvec2 b = glm::abs(target_corner(row + 1, column + 1));
@@ -243,8 +252,7 @@ bool TapBuilder::is_beyond_rim(int row, int column) const {
 }
 
 bool TapBuilder::may_reach_beyond_rim() const {
-  const ProjectionKind kind = job_.target.projection.kind;
-  if (kind != ProjectionKind::angular && kind != ProjectionKind::fisheye) return false;
+  if (!goes_on_beyond_rim(job_.target.projection.kind)) return false;
   return glm::length(glm::max(glm::abs(target_corner(0, 0)),
                               glm::abs(target_corner(tile_.rows, tile_.columns)))) > 1.0;
 }

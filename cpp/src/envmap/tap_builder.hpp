@@ -57,9 +57,9 @@ struct TapChunk {
 /// Whether a tile may have texels that are the first of those that symmetries take to each other.
 bool may_have_first_texels(const Tile& tile, std::span<const SharedSymmetry> symmetries);
 
-/// What a TapBuilder looks up along lines: corners of texels and their centres.
+/// What a TapBuilder for this job looks up along lines: corners of texels, their centres, or both.
 struct TexelLines {
-  explicit TexelLines(const EnvMapLayout& target);
+  explicit TexelLines(const ResampleJob& job);
 
   LineTables corners;
   LineTables centers;

@@ -7,10 +7,9 @@
 #include <OpenEXR/ImfThreading.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <exception>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -23,22 +22,9 @@ namespace mirrorbake::image_files {
 namespace {
 
 constexpr int kBlockRows = 16;  // of ZIP_COMPRESSION
-constexpr float kLargestHalf = 65504.0F;
 
 // Rows that are converted and packed at once: enough blocks for every thread, in little memory.
 int rows_at_once(int threads) { return kBlockRows * std::max(4, 2 * threads); }
-
-// Returns how many values were clamped.
-std::uint64_t to_half(std::span<const float> values, std::vector<std::uint16_t>& halves) {
-  std::uint64_t clamped = 0;
-  halves.clear();
-  for (const float value : values) {
-    const bool is_large = std::abs(value) > kLargestHalf;
-    halves.push_back(half_from_float(is_large ? std::copysign(kLargestHalf, value) : value));
-    clamped += is_large ? 1 : 0;
-  }
-  return clamped;
-}
 
 }  // namespace
 
@@ -49,17 +35,21 @@ std::uint64_t write_exr(const std::string& path, const std::string& file, int wi
       throw FileError(path, "cannot hold a channel named '" + channel + "', expected 1 to 255 characters");
     }
   }
+  const std::size_t row_values = static_cast<std::size_t>(width) * channels.size();
+  const std::size_t value = as_half ? sizeof(std::uint16_t) : sizeof(float);
+  if (kBlockRows * row_values * value > std::numeric_limits<std::int32_t>::max()) {
+    throw FileError(path, "cannot hold " + size_text(width, height, static_cast<int>(channels.size())) +
+                              ": 16 rows may have 2 GiB");
+  }
   const Imf::PixelType type = as_half ? Imf::HALF : Imf::FLOAT;
   Imf::Header header(width, height);
   header.compression() = Imf::ZIP_COMPRESSION;
   header.insert("Software", Imf::StringAttribute("mirrorbake"));
   for (const std::string& channel : channels) header.channels().insert(channel, Imf::Channel(type));
-  const std::size_t row_values = static_cast<std::size_t>(width) * channels.size();
-  const std::size_t value = as_half ? sizeof(std::uint16_t) : sizeof(float);
   const int threads = std::min(thread_count(), Imf::globalThreadCount());
   std::uint64_t clamped = 0;
   std::ofstream stream(file, std::ios::binary);
-  try {
+  {
     Imf::StdOFStream named(stream, file.c_str());
     Imf::OutputFile out(named, header, threads);
     std::vector<std::uint16_t> halves;
@@ -67,7 +57,10 @@ std::uint64_t write_exr(const std::string& path, const std::string& file, int wi
       const int rows = std::min(rows_at_once(threads), height - y);
       const std::span<const float> part = pixels.subspan(static_cast<std::size_t>(y) * row_values,
                                                          static_cast<std::size_t>(rows) * row_values);
-      if (as_half) clamped += to_half(part, halves);
+      if (as_half) {
+        halves.clear();
+        for (const float v : part) halves.push_back(half_from_float(clamp_to_half(v, clamped)));
+      }
       Imf::FrameBuffer frame;
       for (std::size_t c = 0; c < channels.size(); ++c) {
         const void* const first = as_half ? static_cast<const void*>(halves.data() + c) : part.data() + c;
@@ -77,8 +70,6 @@ std::uint64_t write_exr(const std::string& path, const std::string& file, int wi
       out.setFrameBuffer(frame);
       out.writePixels(rows);
     }
-  } catch (const std::exception& error) {
-    throw FileError(path, std::string("cannot be written: ") + error.what());
   }
   // OpenEXR says nothing of what fails when it is done: the table of its blocks and what is still in a buffer.
   stream.close();

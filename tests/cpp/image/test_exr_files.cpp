@@ -382,6 +382,15 @@ TEST_F(ExrFiles, AreTheSameBytesOnAnyNumberOfThreads) {
   EXPECT_THROW(set_exr_threads(1025), InvalidArgument);
 }
 
+TEST_F(ExrFiles, RowsWhoseBlocksExceedTheFormatAreAnErrorAndLeaveNothing) {
+  std::vector<std::string> channels;
+  for (int c = 0; c < 256; ++c) channels.push_back("c" + std::to_string(c));
+  const std::vector<float> row((std::size_t{1} << 25) + channels.size());
+  const int width = static_cast<int>(row.size() / channels.size());
+  EXPECT_THROW(save_image(path("a.exr"), width, 1, channels, row, PixelFormat::float32), FileError);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
 TEST_F(ExrFiles, AChannelNameThatTheFormatCannotHoldIsAnErrorAndLeavesNothing) {
   for (const std::string& name : {std::string(), std::string(256, 'a'), std::string("a\0b", 3)}) {
     EXPECT_THROW(save_image(path("a.exr"), Image(1, 1, {name})), FileError);

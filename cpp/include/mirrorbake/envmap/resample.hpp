@@ -30,8 +30,8 @@ struct ResampleOptions {
 
 /// The finest level of `source` in another projection and size, as a map of one level. What the source does
 /// not cover (a fisheye of less than 360°) is 0. Texels of round maps outside of the unit disc hold what lies
-/// beyond the rim, interpolated. Same bits on any number of threads. Throws InvalidArgument for layouts or matrices that
-/// are not valid, or of more than 2³² − 1 texels.
+/// beyond the rim, in angular maps and fisheyes interpolated from two texels on. Same bits on any number of
+/// threads. Throws InvalidArgument for layouts or matrices that are not valid, or of more than 2³² − 1 texels.
 EnvMap resample(const EnvMapView& source, const Projection& target, int width, int height,
                 const ResampleOptions& options = {});
 

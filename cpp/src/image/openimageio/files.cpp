@@ -12,11 +12,10 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/image/color.hpp"
+#include "mirrorbake/image/half.hpp"
 
 namespace mirrorbake::image_files {
 namespace {
-
-constexpr float kLargestHalf = 65504.0F;
 
 const char* plugin_name(FileKind kind) {
   switch (kind) {
@@ -104,12 +103,7 @@ void round_to_rgbe(std::span<float, 3> color) {
 // Turns `values`, whole pixels, into what `spec` stores.
 void encode(const OIIO::ImageSpec& spec, FileKind kind, std::span<float> values, SaveReport& report) {
   if (spec.format == OIIO::TypeDesc::HALF) {
-    for (float& v : values) {
-      if (std::abs(v) > kLargestHalf) {
-        v = std::copysign(kLargestHalf, v);
-        ++report.clamped_to_half;
-      }
-    }
+    for (float& v : values) v = clamp_to_half(v, report.clamped_to_half);
     return;
   }
   if (kind == FileKind::hdr) {

@@ -11,7 +11,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
-#include "line_lookup.hpp"
+#include "resample/line_lookup.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"

@@ -2,8 +2,8 @@
 
 Here are scenes, the ray tracer, image files and the inference. Environment maps, projections, Fresnel
 reflectance and proxy geometry have modules of their own: `mirrorbake.envmap`, `mirrorbake.projection`,
-`mirrorbake.fresnel`, `mirrorbake.proxy`. Whole bakes are in `mirrorbake.bake`, `mirrorbake.evaluate` and
-`mirrorbake.render`, and behind the command `mirrorbake`.
+`mirrorbake.fresnel`, `mirrorbake.proxy`. Whole bakes are in `mirrorbake.scene`, `mirrorbake.pem`,
+`mirrorbake.bake` and `mirrorbake.evaluate`, and behind the command `mirrorbake`.
 """
 
 from mirrorbake._core import (

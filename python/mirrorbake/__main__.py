@@ -1,6 +1,6 @@
 """`python -m mirrorbake` is the command `mirrorbake`."""
 
-from mirrorbake.cli import main
+from mirrorbake.commands.main import main
 
 if __name__ == "__main__":
     main()

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+FloatArray: TypeAlias = NDArray[np.float32]
+"""float32 array; shapes are in the docstrings."""
 
 Scalar = TypeVar("Scalar", np.float32, np.float64, np.int32)
 

@@ -11,6 +11,8 @@ direction of that point as seen from the map's origin:
 """
 
 import contextlib
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +42,8 @@ __all__ = [
     "fit_ellipsoid",
     "hull_triangles",
     "mirror_lookups",
+    "proxy_from_attributes",
+    "proxy_to_attributes",
 ]
 
 
@@ -76,3 +80,30 @@ def hull_triangles(
         with contextlib.suppress(QhullError):
             extremes = positions[ConvexHull(positions).vertices]
     return _core.hull_triangles(positions, triangles, extremes, tolerance).astype(np.bool_)
+
+
+def proxy_from_attributes(description: Mapping[str, Any]) -> _core.Proxy:
+    """Return the proxy that a PEM's attributes describe."""
+    shape, origin = description["shape"], description["origin"]
+    if shape == "infinite":
+        return _core.Proxy.infinite(origin)
+    centre, axes = description["centre"], np.array(description["axes"], np.float32)
+    if shape == "box":
+        return _core.Proxy.box(centre, description["half_extent"], origin, axes)
+    if shape == "hemisphere":
+        return _core.Proxy.hemisphere(centre, description["radius"], origin, axes)
+    return _core.Proxy.ellipsoid(centre, description["radii"], origin, axes)
+
+
+def proxy_to_attributes(proxy: _core.Proxy) -> dict[str, Any]:
+    """Inverse of `proxy_from_attributes`."""
+    fields = {
+        "infinite": (),
+        "box": ("centre", "half_extent", "axes"),
+        "ellipsoid": ("centre", "radii", "axes"),
+        "hemisphere": ("centre", "radius", "axes"),
+    }[proxy.kind]
+    description: dict[str, Any] = {"shape": proxy.kind}
+    for field in (*fields, "origin"):
+        description[field] = np.asarray(getattr(proxy, field)).astype(float).tolist()
+    return description

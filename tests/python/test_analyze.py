@@ -9,20 +9,27 @@ import numpy as np
 import pytest
 
 from mirrorbake import _core
-from mirrorbake.analyze import LARGEST_MAP, MAX_DEPTH, MIRROR_SAMPLES, MOST_SAMPLES, SMALLEST_MAP, analyze
-from mirrorbake.bake import bake
-from mirrorbake.config import parse_config
+from mirrorbake.bake.analyze import (
+    LARGEST_MAP,
+    MAX_DEPTH,
+    MIRROR_SAMPLES,
+    MOST_SAMPLES,
+    SMALLEST_MAP,
+    analyze,
+)
+from mirrorbake.bake.bake import bake
 from mirrorbake.errors import InputError
-from mirrorbake.evaluate import open_pem
-from mirrorbake.scene import prepare_stage
+from mirrorbake.pem.opened import open_pem
+from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.stage import prepare_stage
 
 from .gltf_scene import SQUARE, SQUARE_TRIANGLES, GlbScene
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mirrorbake.plan import Decision, Plan
-    from mirrorbake.scene import Stage
+    from mirrorbake.scene.plan import Decision, Plan
+    from mirrorbake.scene.stage import Stage
 
 CONVEX = _core.make_box((-0.5, 0, -0.5), (0.5, 1, 0.5))
 RING = _core.make_torus((0, 0.5, 0), 0.6, 0.3, 48)

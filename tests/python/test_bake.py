@@ -13,24 +13,21 @@ import pytest
 from rich.console import Console
 
 from mirrorbake import _core
-from mirrorbake.bake import bake
-from mirrorbake.config import parse_config
-from mirrorbake.contact_sheet import contact_sheet
-from mirrorbake.demo import demo_config
+from mirrorbake.bake.bake import bake
 from mirrorbake.errors import InputError
-from mirrorbake.evaluate import Evaluation, OpenedPem, ViewMetrics, evaluate, open_pem
-from mirrorbake.metrics import psnr
-from mirrorbake.proxy import hull_triangles
-from mirrorbake.report import metrics_table
-from mirrorbake.run_time import (
-    CONTENDERS,
-    RunTime,
-    images_of_trace,
-    proxy_from_attributes,
-    proxy_to_attributes,
-)
-from mirrorbake.scene import Stage, prepare_stage
-from mirrorbake.store import PemStore
+from mirrorbake.evaluate.contact_sheet import contact_sheet
+from mirrorbake.evaluate.contenders import CONTENDERS
+from mirrorbake.evaluate.demo import demo_config
+from mirrorbake.evaluate.evaluate import Evaluation, ViewMetrics, evaluate
+from mirrorbake.evaluate.metrics import psnr
+from mirrorbake.evaluate.table import metrics_table
+from mirrorbake.pem.opened import OpenedPem, open_pem
+from mirrorbake.pem.run_time import RunTime
+from mirrorbake.pem.store import PemStore
+from mirrorbake.pem.view_images import images_of_trace
+from mirrorbake.proxy import hull_triangles, proxy_from_attributes, proxy_to_attributes
+from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.stage import Stage, prepare_stage
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from mirrorbake.config import PATH_KEYS, SceneConfig, load_config, parse_config, parse_override
 from mirrorbake.errors import InputError
-from mirrorbake.plan import DECIDED_KEYS
+from mirrorbake.scene.config import PATH_KEYS, SceneConfig
+from mirrorbake.scene.load import load_config, parse_config, parse_override
+from mirrorbake.scene.plan import DECIDED_KEYS
 
 if TYPE_CHECKING:
     from pathlib import Path

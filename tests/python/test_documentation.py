@@ -8,9 +8,9 @@ import pytest
 from typer.main import get_command
 
 import mirrorbake
-from mirrorbake.bake import bake
-from mirrorbake.cli import app
-from mirrorbake.config import parse_config
+from mirrorbake.bake.bake import bake
+from mirrorbake.commands.main import app
+from mirrorbake.scene.load import parse_config
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

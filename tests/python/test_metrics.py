@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mirrorbake.metrics import display_referred, mean_or_none, psnr
+from mirrorbake.evaluate.metrics import display_referred, mean_or_none, psnr
 
 
 def test_the_transfer_function_has_the_published_values_of_srgb() -> None:

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from mirrorbake import _core
-from mirrorbake.config import parse_config
 from mirrorbake.errors import InputError
-from mirrorbake.scene import Arc, build_scene, hash_inputs, rotation_matrix, winding_number
+from mirrorbake.scene.build import build_scene, rotation_matrix, winding_number
+from mirrorbake.scene.inputs import hash_inputs
+from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.parameters import Arc
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,12 +11,13 @@ import pytest
 
 import mirrorbake
 from mirrorbake import _core
-from mirrorbake.bake import bake
-from mirrorbake.config import parse_config
+from mirrorbake.bake.bake import bake
 from mirrorbake.errors import InputError, StoreError
-from mirrorbake.evaluate import evaluate
-from mirrorbake.scene import build_scene, hash_inputs
-from mirrorbake.store import Source
+from mirrorbake.evaluate.evaluate import evaluate
+from mirrorbake.pem.header import Source
+from mirrorbake.scene.build import build_scene
+from mirrorbake.scene.inputs import hash_inputs
+from mirrorbake.scene.load import parse_config
 
 from .gltf_scene import SQUARE, SQUARE_NORMALS, SQUARE_TRIANGLES, SQUARE_UVS, GlbScene, png
 

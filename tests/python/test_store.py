@@ -12,21 +12,11 @@ import pytest
 import zarr
 
 from mirrorbake.errors import StoreError
-from mirrorbake.plan import Decision, Plan
-from mirrorbake.store import (
-    GROUP_NAME,
-    Header,
-    PemStore,
-    Source,
-    Timings,
-    ViewImages,
-    coarser_sizes,
-    decimate,
-    exclusive,
-    join_pyramid,
-    residual_texels,
-    split_pyramid,
-)
+from mirrorbake.pem.header import Header, Source
+from mirrorbake.pem.pyramid import coarser_sizes, decimate, join_pyramid, residual_texels, split_pyramid
+from mirrorbake.pem.store import GROUP_NAME, PemStore, Timings, exclusive
+from mirrorbake.pem.view_images import ViewImages
+from mirrorbake.scene.plan import Decision, Plan
 
 VIEWS, SIZE, WIDTH, HEIGHT = 3, 8, 6, 4
 TEXELS = 6 * (64 + 16 + 4 + 1)
@@ -189,7 +179,7 @@ import os, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 from pathlib import Path
 import test_store
-from mirrorbake.store import PemStore, Timings
+from mirrorbake.pem.store import PemStore, Timings
 store = PemStore.open(Path({str(tmp_path)!r}), writable=True)
 store.write_view(0, *test_store.make_view(0), Timings(1, 2, 3))
 original = store._array
@@ -214,7 +204,7 @@ def test_overwriting_a_view_takes_its_mark_away_first(
     def fail(*arguments: Any) -> Any:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mirrorbake.store.split_pyramid", fail)
+    monkeypatch.setattr("mirrorbake.pem.store.split_pyramid", fail)
     with pytest.raises(StoreError, match="No space left"):
         store.write_view(2, *make_view(2), Timings(1.0, 2.0, 3.0))
     assert store.completed().tolist() == [True, True, False]
@@ -224,7 +214,7 @@ def test_creation_that_fails_leaves_no_pem(tmp_path: Path, monkeypatch: pytest.M
     def fail(*arguments: Any) -> Any:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mirrorbake.store._put", fail)
+    monkeypatch.setattr("mirrorbake.pem.store._put", fail)
     with pytest.raises(StoreError, match="No space left"):
         make_store(tmp_path)
     assert not PemStore.exists(tmp_path)

@@ -19,10 +19,10 @@ import zarr
 from typer.testing import CliRunner
 
 from mirrorbake import _core
-from mirrorbake.cli import app
-from mirrorbake.config import load_config
-from mirrorbake.plan import DECIDED_KEYS
-from mirrorbake.store import GROUP_NAME, PemStore
+from mirrorbake.commands.main import app
+from mirrorbake.pem.store import GROUP_NAME, PemStore
+from mirrorbake.scene.load import load_config
+from mirrorbake.scene.plan import DECIDED_KEYS
 
 EXIT_USAGE, EXIT_INPUT = 2, 3
 
@@ -413,7 +413,7 @@ def test_the_demonstration_leaves_figures_and_a_contact_sheet(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = write_scene(tmp_path)
-    monkeypatch.setattr("mirrorbake.demo.demo_config", lambda: load_config(scene))
+    monkeypatch.setattr("mirrorbake.evaluate.demo.demo_config", lambda: load_config(scene))
     result = run("demo", "--out", tmp_path / "demo")
     assert result.returncode == 0, result.stderr
     assert "mean half-way" in result.stdout

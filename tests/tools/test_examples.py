@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from mirrorbake.bake import bake
-from mirrorbake.config import SceneConfig, load_config, parse_override
-from mirrorbake.evaluate import evaluate
-from mirrorbake.scene import prepare_stage
+from mirrorbake.bake.bake import bake
+from mirrorbake.evaluate.evaluate import evaluate
+from mirrorbake.scene.config import SceneConfig
+from mirrorbake.scene.load import load_config, parse_override
+from mirrorbake.scene.stage import prepare_stage
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DATA = os.environ.get("MIRRORBAKE_TEST_DATA")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mirrorbake.cli import app
+from mirrorbake.commands.main import app
 from mirrorbake.envmap import EnvMap
 from programs import find_program
 

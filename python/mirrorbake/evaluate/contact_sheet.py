@@ -11,10 +11,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from mirrorbake.evaluate import render_contenders
+from mirrorbake.evaluate.contenders import TITLES, render_contenders
+from mirrorbake.evaluate.metrics import OBJECT_COVERAGE, display_referred, psnr
 from mirrorbake.files import atomic_output
-from mirrorbake.metrics import OBJECT_COVERAGE, display_referred, psnr
-from mirrorbake.run_time import TITLES, images_of_trace
+from mirrorbake.pem.view_images import images_of_trace
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from mirrorbake.evaluate import OpenedPem
-    from mirrorbake.metrics import FloatArray
-    from mirrorbake.store import ViewImages
+    from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.opened import OpenedPem
+    from mirrorbake.pem.view_images import ViewImages
 
 ERROR_RANGE = 0.25
 """Display-referred error at which the colour scale of the error images ends."""

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mirrorbake.bake import bake
-from mirrorbake.config import SceneConfig, parse_config
-from mirrorbake.contact_sheet import contact_sheet
-from mirrorbake.evaluate import evaluate, open_pem
-from mirrorbake.scene import prepare_stage
+from mirrorbake.bake.bake import bake
+from mirrorbake.evaluate.contact_sheet import contact_sheet
+from mirrorbake.evaluate.evaluate import evaluate
+from mirrorbake.pem.opened import open_pem
+from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.stage import prepare_stage
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from mirrorbake.bake import ProgressReport
-    from mirrorbake.evaluate import Evaluation
+    from mirrorbake.bake.bake import ProgressReport
+    from mirrorbake.evaluate.evaluate import Evaluation
+    from mirrorbake.scene.config import SceneConfig
 
 SHEET_NAME = "contact-sheet.png"
 

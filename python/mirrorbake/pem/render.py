@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from mirrorbake import _core
 from mirrorbake.errors import InputError, OptionError
-from mirrorbake.evaluate import open_pem
 from mirrorbake.files import check_writable
-from mirrorbake.run_time import images_of_trace
+from mirrorbake.pem.opened import open_pem
+from mirrorbake.pem.view_images import images_of_trace
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mirrorbake.metrics import FloatArray
+    from mirrorbake.arrays import FloatArray
 
 PICTURE_SUFFIXES = (".exr", ".png")
 

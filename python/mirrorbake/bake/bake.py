@@ -11,20 +11,23 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.analyze import analyze
+from mirrorbake.bake.analyze import analyze
 from mirrorbake.errors import StoreError
-from mirrorbake.proxy import hull_triangles
-from mirrorbake.run_time import images_of_trace, proxy_from_attributes, proxy_to_attributes
-from mirrorbake.scene import hash_inputs, prepare_stage
-from mirrorbake.store import GROUP_NAME, Header, PemStore, Source, Timings, exclusive
+from mirrorbake.pem.header import Header, Source
+from mirrorbake.pem.store import GROUP_NAME, PemStore, Timings, exclusive
+from mirrorbake.pem.view_images import images_of_trace
+from mirrorbake.proxy import hull_triangles, proxy_from_attributes, proxy_to_attributes
+from mirrorbake.scene.inputs import hash_inputs
+from mirrorbake.scene.stage import prepare_stage
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mirrorbake.config import SceneConfig
-    from mirrorbake.metrics import FloatArray
-    from mirrorbake.plan import Plan
-    from mirrorbake.scene import BuiltScene, Stage
+    from mirrorbake.arrays import FloatArray
+    from mirrorbake.scene.build import BuiltScene
+    from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.plan import Plan
+    from mirrorbake.scene.stage import Stage
 
 ProgressReport: TypeAlias = Callable[[int, int, str], None]
 """Called with steps done, steps in all, and what is going on."""

@@ -1,83 +1,22 @@
-"""Drawing the reflector from maps, in software: the PEM at any parameter, and its static competitors."""
+"""Drawing the reflector from maps, in software: the PEM at any parameter, and static maps."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.errors import OptionError
-from mirrorbake.store import ViewImages
+from mirrorbake.proxy import proxy_from_attributes
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
-    from mirrorbake.metrics import FloatArray
-    from mirrorbake.store import Header, PemStore
-
-CONTENDERS = ("pem", "static_infinite", "static_proxy")
-"""What an evaluation compares with ray tracing, in the order of its tables."""
-
-TITLES = {
-    "pem": "PEM",
-    "static_infinite": "Static map at infinity",
-    "static_proxy": "Static map on the PEM's geometry",
-}
-"""How tables and pictures call the contenders."""
-
-
-def proxy_from_attributes(description: Mapping[str, Any]) -> _core.Proxy:
-    """Return the proxy that a PEM's attributes describe."""
-    shape, origin = description["shape"], description["origin"]
-    if shape == "infinite":
-        return _core.Proxy.infinite(origin)
-    centre, axes = description["centre"], np.array(description["axes"], np.float32)
-    if shape == "box":
-        return _core.Proxy.box(centre, description["half_extent"], origin, axes)
-    if shape == "hemisphere":
-        return _core.Proxy.hemisphere(centre, description["radius"], origin, axes)
-    return _core.Proxy.ellipsoid(centre, description["radii"], origin, axes)
-
-
-def proxy_to_attributes(proxy: _core.Proxy) -> dict[str, Any]:
-    """Inverse of `proxy_from_attributes`."""
-    fields = {
-        "infinite": (),
-        "box": ("centre", "half_extent", "axes"),
-        "ellipsoid": ("centre", "radii", "axes"),
-        "hemisphere": ("centre", "radius", "axes"),
-    }[proxy.kind]
-    description: dict[str, Any] = {"shape": proxy.kind}
-    for field in (*fields, "origin"):
-        description[field] = np.asarray(getattr(proxy, field)).astype(float).tolist()
-    return description
-
-
-def images_of_trace(trace: _core.LayerTrace) -> ViewImages:
-    """Separate the object from what is behind it in a ray-traced view."""
-    samples = trace.samples
-    shape = (samples.height, samples.width)
-    pixel = np.asarray(samples.pixel)
-    count = np.bincount(pixel, minlength=shape[0] * shape[1])
-    beauty = np.asarray(trace.sample_beauty)
-    total = np.stack(
-        [np.bincount(pixel, weights=beauty[:, c], minlength=count.size) for c in range(3)], axis=-1
-    )
-    coverage = (count / samples.samples_per_pixel).reshape(shape)
-    light = (total / np.maximum(count, 1)[:, None]).reshape(*shape, 3)
-    channels = list(trace.channels)
-    picture = np.asarray(trace.layers)[..., [channels.index(name) for name in "RGB"]]
-    # Where the object covers the whole pixel the difference is rounding, not light.
-    background = np.where(coverage[..., None] < 1.0, picture - coverage[..., None] * light, 0.0)
-    return ViewImages(
-        object=light.astype(np.float32),
-        coverage=coverage.astype(np.float32),
-        background=np.maximum(background, 0.0).astype(np.float32),
-    )
+    from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.header import Header
+    from mirrorbake.pem.store import PemStore
 
 
 @dataclass

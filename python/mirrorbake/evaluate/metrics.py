@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray: TypeAlias = NDArray[np.float32]
-"""float32 array; shapes are in the docstrings."""
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from mirrorbake.arrays import FloatArray
 
 DISPLAY_TRANSFORM = "clip to [0,1], then the sRGB transfer function (IEC 61966-2-1), unquantised; exposure 1"
 """What `display_referred` does, in words, for reports."""

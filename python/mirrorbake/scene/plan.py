@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from mirrorbake.config import SceneConfig
+    from mirrorbake.scene.config import SceneConfig
 
 DECIDED_KEYS = (
     "trace.depth",

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from mirrorbake.run_time import CONTENDERS, TITLES
+from mirrorbake.evaluate.contenders import CONTENDERS, TITLES
 
 if TYPE_CHECKING:
-    from mirrorbake.evaluate import Evaluation, ViewMetrics
+    from mirrorbake.evaluate.evaluate import Evaluation, ViewMetrics
 
 MAX_TABLE_ROWS = 24
 """A longer evaluation is thinned out in the table; metrics.json has every view."""

@@ -28,12 +28,10 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import hashlib
-import json
 import os
 import shutil
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import zarr
@@ -41,7 +39,9 @@ import zarr.errors
 from zarr.codecs import BloscCodec, BloscShuffle
 
 from mirrorbake.errors import StoreError
-from mirrorbake.plan import Plan
+from mirrorbake.pem.header import FORMAT_VERSION, Header
+from mirrorbake.pem.pyramid import LARGEST_HALF, join_pyramid, residual_texels, split_pyramid
+from mirrorbake.pem.view_images import ViewImages
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -49,247 +49,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from mirrorbake.metrics import FloatArray
+    from mirrorbake.arrays import FloatArray
 
-FORMAT_VERSION = 2
 GROUP_NAME = "pem.zarr"
 ATTRIBUTE = "mirrorbake"
-LARGEST_HALF = 65504.0
 
 LAYER_CHANNELS: Mapping[str, int] = {"local": 4, "distant": 3}
 """Channels of a map: RGBA of the local layer, RGB of the distant one."""
-
-
-def decimate(level: FloatArray) -> FloatArray:
-    """Next coarser level: the mean of every 2×2 block of each face.
-
-    Parameters
-    ----------
-    level
-        Shape (6, S, S, C), S even, float32.
-
-    Returns
-    -------
-    array
-        Shape (6, S/2, S/2, C), float32.
-    """
-    top = level[:, 0::2, 0::2] + level[:, 0::2, 1::2]
-    bottom = level[:, 1::2, 0::2] + level[:, 1::2, 1::2]
-    return (top + bottom) * np.float32(0.25)
-
-
-def residual_texels(size: int) -> int:
-    """Number of texels of all levels but the finest, for a power of two."""
-    return sum(6 * s * s for s in coarser_sizes(size))
-
-
-def coarser_sizes(size: int) -> list[int]:
-    """Sides of the levels below one of `size` texels, down to 1."""
-    return [size >> level for level in range(1, size.bit_length())]
-
-
-def split_pyramid(pyramid: FloatArray, size: int, dtype: str) -> tuple[NDArray[Any], NDArray[Any], int]:
-    """Split a pyramid into what is stored: the finest level and the residuals of the others.
-
-    Parameters
-    ----------
-    pyramid
-        Shape (texels, C): levels one after the other, the finest first.
-    size
-        Texels along a side of the finest level.
-    dtype
-        'float16' or 'float32'. Residuals refer to the finest level as it is stored, so they also take up its
-        rounding.
-
-    Returns
-    -------
-    tuple
-        The finest level (6, S, S, C), the residuals (R, C), and how many values were clamped to ±65504
-        because float16 ends there.
-    """
-    channels = pyramid.shape[1]
-    clamped = 0
-    if dtype == "float16":
-        clamped = int(np.count_nonzero(np.abs(pyramid) > LARGEST_HALF))
-        pyramid = np.clip(pyramid, -LARGEST_HALF, LARGEST_HALF)
-    count = 6 * size * size
-    finest = pyramid[:count].reshape(6, size, size, channels).astype(dtype)
-    residuals = np.empty((residual_texels(size), channels), dtype)
-    level = finest.astype(np.float32)
-    offset = 0
-    for s in coarser_sizes(size):
-        level = decimate(level)
-        texels = 6 * s * s
-        values = pyramid[count + offset : count + offset + texels]
-        residuals[offset : offset + texels] = (values - level.reshape(texels, channels)).astype(dtype)
-        offset += texels
-    return finest, residuals, clamped
-
-
-def join_pyramid(finest: NDArray[Any], residuals: NDArray[Any]) -> FloatArray:
-    """Inverse of `split_pyramid`, up to the rounding of the storage. Returns shape (texels, C), float32."""
-    size, channels = finest.shape[1], finest.shape[3]
-    level = finest.astype(np.float32)
-    pyramid = np.empty((6 * size * size + residuals.shape[0], channels), np.float32)
-    offset = 6 * size * size
-    pyramid[:offset] = level.reshape(-1, channels)
-    for s in coarser_sizes(size):
-        level = decimate(level)
-        texels = 6 * s * s
-        start = offset - 6 * size * size
-        pyramid[offset : offset + texels] = (
-            level.reshape(texels, channels) + residuals[start : start + texels]
-        )
-        offset += texels
-    return pyramid
-
-
-Inputs: TypeAlias = dict[str, dict[str, Any]]
-"""Files of a scene: key → {path, sha256, files}; `files`, if it refers to any, are {name: sha256}."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """What a PEM is made from."""
-
-    library: str
-    """Version of mirrorbake that writes it."""
-    config: dict[str, Any]
-    """The scene file with its defaults filled in and absolute paths."""
-    inputs: Inputs
-    """Files that the scene uses."""
-
-    @property
-    def fingerprint(self) -> str:
-        """Changes with everything that decides what a bake computes, but not with where its inputs lie."""
-        text = json.dumps([FORMAT_VERSION, self.library, self._content()], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
-
-    def _content(self) -> dict[str, Any]:
-        content: dict[str, Any] = json.loads(json.dumps(self.config))
-        for key, source in self.inputs.items():
-            section, name = key.split(".")
-            content[section][name] = {"sha256": source["sha256"], "files": source.get("files", {})}
-        return content
-
-    def difference_from(self, other: Source) -> str:
-        """Words for the first thing in which this source differs from another."""
-        if self.library != other.library:
-            return f"mirrorbake {other.library} instead of {self.library}"
-        mine, others = self._content(), other._content()
-        for section, table in mine.items():
-            present = others[section] or {}
-            for key, value in (table or {}).items():
-                theirs = present.get(key)
-                if theirs != value:
-                    name = f"{section}.{key}"
-                    if name in self.inputs and name in other.inputs:
-                        assert theirs is not None
-                        return f"{name}: {_changed_file(value, theirs)}"
-                    return f"{name} = {theirs!r} instead of {value!r}"
-            if table is None and others[section] is not None:
-                return f"a section [{section}] instead of none"
-        return "nothing"
-
-
-def _changed_file(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> str:
-    if mine["sha256"] != theirs["sha256"]:
-        return "a file of other content"
-    a, b = mine["files"], theirs["files"]
-    name = min(name for name in {**a, **b} if a.get(name) != b.get(name))
-    if name not in a:
-        return f"its file {name} is missing"
-    return f"its file {name} " + ("has another content" if name in b else "was not there")
-
-
-@dataclass(frozen=True)
-class Header:
-    """What the attributes of a PEM say."""
-
-    source: Source
-    plan: Plan
-    """What was decided before the bake; a resumed one keeps to it."""
-    parameters: list[float]
-    """t of every view, in [0,1]."""
-    parts: list[dict[str, Any]]
-    """Per part of the reflector, in order: name, and layers as {layer name: proxy}."""
-    static: dict[str, Any]
-    """Proxies of the static maps: `infinite`, and `proxy`: the distant layer's, None if that is infinite."""
-    map_size: int
-    precision: Literal["float16", "float32"]
-    image_size: tuple[int, int]
-    """Pixels: width, height."""
-
-    @property
-    def fingerprint(self) -> str:
-        """Changes with everything that decides what a bake computes: its source and its plan."""
-        text = json.dumps([self.source.fingerprint, self.plan.to_json()], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
-
-    def to_attributes(self) -> dict[str, Any]:
-        """Return the JSON-like value of the group's attribute."""
-        return {
-            "format": "pem",
-            "format_version": FORMAT_VERSION,
-            "library": self.source.library,
-            "fingerprint": self.fingerprint,
-            "conventions": {
-                "world": "right-handed, +Y up, metres",
-                "radiance": "scene-linear, Rec.709 primaries",
-                "faces": "+X -X +Y -Y +Z -Z, OpenGL orientation, row 0 on top",
-                "residuals": "level l = mean of 2x2 blocks of level l-1, from `finest` down, plus residual",
-                "level_sizes": [self.map_size, *coarser_sizes(self.map_size)],
-            },
-            "map_size": self.map_size,
-            "precision": self.precision,
-            "image_size": list(self.image_size),
-            "parameters": self.parameters,
-            "parts": self.parts,
-            "static": self.static,
-            "config": self.source.config,
-            "plan": self.plan.to_json(),
-            "inputs": self.source.inputs,
-        }
-
-    @staticmethod
-    def from_attributes(attributes: Mapping[str, Any]) -> Header:
-        """Inverse of `to_attributes`. Raises KeyError or TypeError for what is not one."""
-        width, height = attributes["image_size"]
-        return Header(
-            source=Source(attributes["library"], attributes["config"], attributes["inputs"]),
-            plan=Plan.from_json(attributes["plan"]),
-            parameters=list(attributes["parameters"]),
-            parts=attributes["parts"],
-            static=attributes["static"],
-            map_size=attributes["map_size"],
-            precision=attributes["precision"],
-            image_size=(width, height),
-        )
-
-    def map_names(self) -> list[tuple[str, str]]:
-        """(part, layer) of every map of a view."""
-        return [(part["name"], layer) for part in self.parts for layer in part["layers"]]
-
-
-@dataclass(frozen=True)
-class ViewImages:
-    """Ray-traced images of one view, float32."""
-
-    object: FloatArray
-    """(H, W, 3) radiance of the object, mean over the samples that see it; 0 elsewhere."""
-    coverage: FloatArray
-    """(H, W) fraction of the pixel's samples that see the object."""
-    background: FloatArray
-    """(H, W, 3) radiance of the others, times their fraction."""
-
-    def composite(self, object_radiance: FloatArray) -> FloatArray:
-        """The whole picture with another rendering (H, W, 3) of the object in it."""
-        return self.background + self.coverage[..., None] * object_radiance
-
-    @property
-    def beauty(self) -> FloatArray:
-        """The ray-traced picture (H, W, 3)."""
-        return self.composite(self.object)
 
 
 @dataclass(frozen=True)

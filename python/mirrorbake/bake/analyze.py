@@ -10,17 +10,16 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.errors import InputError
-from mirrorbake.plan import Decision, Plan
-from mirrorbake.proxy import choose_proxy, hull_triangles
-from mirrorbake.run_time import proxy_to_attributes
+from mirrorbake.proxy import choose_proxy, hull_triangles, proxy_to_attributes
+from mirrorbake.scene.plan import Decision, Plan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from mirrorbake.metrics import FloatArray
-    from mirrorbake.scene import Stage
+    from mirrorbake.arrays import FloatArray
+    from mirrorbake.scene.stage import Stage
 
     DoubleArray = NDArray[np.float64]
 

@@ -1,59 +1,31 @@
-"""From a scene file to what the ray tracer takes, and to the cameras of the views."""
+"""From a scene file to objects in front of a ray tracer."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.config import ILLUMINANT, PATH_KEYS
 from mirrorbake.errors import InputError
-from mirrorbake.files import sha256_of
+from mirrorbake.scene.config import (
+    ILLUMINANT,
+    MaterialConfig,
+    Reflector,
+    SceneConfig,
+    Surroundings,
+)
+from mirrorbake.scene.parameters import Arc, resolve_arc
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mirrorbake.config import MaterialConfig, Reflector, SceneConfig, Surroundings, Views
-    from mirrorbake.metrics import FloatArray
-    from mirrorbake.plan import Plan
-    from mirrorbake.store import Inputs
-
-DEFAULT_ELEVATION_DEGREES = 20.0
-FRAME_FILL = 0.9
-"""Fraction of the frame's height that the object's bounding sphere takes at the default distance."""
+    from mirrorbake.arrays import FloatArray
 
 REFLECTOR_NAME = "reflector"
 GROUND_THICKNESS = 0.02
-
-
-@dataclass(frozen=True)
-class Arc:
-    """The path of the eye: a circular arc about the vertical through `centre`. Lengths in metres."""
-
-    centre: tuple[float, float, float]
-    radius: float
-    height: float
-    start: float
-    degrees: float
-    fov: float
-    size: tuple[int, int]
-
-    def eye(self, t: float) -> tuple[float, float, float]:
-        """Return the eye's position for t in [0,1], world space."""
-        angle = math.radians(self.start + t * self.degrees)
-        x, y, z = self.centre
-        return (x + self.radius * math.sin(angle), y + self.height, z + self.radius * math.cos(angle))
-
-    def camera(self, t: float) -> _core.Camera:
-        """Return the camera for t in [0,1]."""
-        width, height = self.size
-        return _core.Camera(
-            self.eye(t), self.centre, vertical_fov_degrees=self.fov, width=width, height=height
-        )
 
 
 @dataclass(frozen=True)
@@ -73,39 +45,6 @@ class BuiltScene:
     arc: Arc
     notes: list[str]
     """What the user should know about the inputs, such as values that had to be changed."""
-
-
-_CONTENT = {
-    "reflector.mesh": _core.FileContent.mesh,
-    "surroundings.scene": _core.FileContent.scene,
-}
-"""Inputs that refer to further files."""
-
-
-def hash_inputs(config: SceneConfig) -> Inputs:
-    """Files that a scene uses, with those that they refer to: buffers, textures, material libraries.
-
-    Raises
-    ------
-    InputError
-        One cannot be read; the message names it.
-    mirrorbake.FileError
-        A mesh or a scene is corrupt, so that what it refers to is not known.
-    """
-    inputs: Inputs = {}
-    for section, key in PATH_KEYS:
-        path = getattr(getattr(config, section), key, None)
-        if path is None:
-            continue
-        name = f"{section}.{key}"
-        inputs[name] = {"path": path, "sha256": sha256_of(Path(path))}
-        if name in _CONTENT:
-            folder = Path(path).resolve().parent
-            files = [Path(file) for file in _core.referenced_files(path, _CONTENT[name])]
-            inputs[name]["files"] = {
-                file.relative_to(folder).as_posix(): sha256_of(file) for file in sorted(files)
-            }
-    return inputs
 
 
 def build_scene(config: SceneConfig) -> BuiltScene:
@@ -132,7 +71,7 @@ def build_scene(config: SceneConfig) -> BuiltScene:
     positions = np.asarray(mesh.positions)
     triangles = np.asarray(mesh.triangles)
     parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
-    arc = _resolve_arc(config.views, positions)
+    arc = resolve_arc(config.views, positions)
     for t in config.views.parameters():
         if winding_number(positions, triangles, np.array(arc.eye(t))) > 0.5:
             raise InputError(
@@ -149,48 +88,6 @@ def build_scene(config: SceneConfig) -> BuiltScene:
         arc=arc,
         notes=notes,
     )
-
-
-@dataclass(frozen=True)
-class Stage:
-    """A scene and its ray tracer: slow to prepare, so a bake and its evaluation can share it."""
-
-    config: SceneConfig
-    built: BuiltScene
-    tracer: _core.Tracer
-
-    @property
-    def options(self) -> _core.TraceOptions:
-        """Options of every view. All views share the seed: a view is the same in every bake."""
-        trace = self.config.trace
-        assert trace.samples is not None, "the scene has to be planned first"
-        assert trace.depth is not None, "the scene has to be planned first"
-        return _core.TraceOptions(
-            samples_per_pixel=trace.samples, max_specular_depth=trace.depth, seed=trace.seed
-        )
-
-    def planned(self, plan: Plan) -> Stage:
-        """Return the stage with what a plan decides in place of "auto", so that its views can be traced."""
-        return replace(self, config=plan.resolve(self.config))
-
-    def visibility(self, t: float) -> _core.SurfaceSamples:
-        """Where the camera of t sees the reflector."""
-        return self.tracer.trace_visibility(self.built.arc.camera(t), self.built.reflector, self.options)
-
-    def trace(self, t: float) -> _core.LayerTrace:
-        """Ray trace the layers of the view of t."""
-        return self.tracer.trace_layers(self.built.arc.camera(t), self.built.reflector, self.options)
-
-
-def prepare_stage(config: SceneConfig) -> Stage:
-    """Build a scene and make it ready for tracing; raises as `build_scene` does."""
-    built = build_scene(config)
-    options = _core.TracerOptions(
-        indirect=getattr(_core.IndirectLight, config.trace.indirect),
-        cache_rays=config.trace.cache_rays,
-        seed=config.trace.seed,
-    )
-    return Stage(config, built, _core.Tracer(built.scene, options))
 
 
 def winding_number(positions: FloatArray, triangles: NDArray[np.uint32], point: NDArray[np.float64]) -> float:
@@ -356,23 +253,3 @@ def _add_panorama(scene: _core.Scene, surroundings: Surroundings) -> list[str]:
         )
         scene.add_object("ground", disc, scene.add_material(material), [])
     return notes
-
-
-def _resolve_arc(views: Views, positions: FloatArray) -> Arc:
-    low, high = positions.min(axis=0).astype(float), positions.max(axis=0).astype(float)
-    middle = 0.5 * (low + high)
-    centre = views.centre or (middle[0], middle[1], middle[2])
-    elevation = math.radians(DEFAULT_ELEVATION_DEGREES)
-    sphere = 0.5 * float(np.linalg.norm(high - low))
-    distance = sphere / (FRAME_FILL * math.sin(math.radians(0.5 * views.fov)))
-    radius = distance * math.cos(elevation) if views.radius is None else views.radius
-    height = radius * math.tan(elevation) if views.height is None else views.height
-    return Arc(
-        centre=(float(centre[0]), float(centre[1]), float(centre[2])),
-        radius=radius,
-        height=height,
-        start=views.start,
-        degrees=views.degrees,
-        fov=views.fov,
-        size=views.size,
-    )

@@ -8,66 +8,21 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mirrorbake.config import parse_config
-from mirrorbake.errors import StoreError
+from mirrorbake.evaluate.contenders import CONTENDERS, render_contenders
+from mirrorbake.evaluate.metrics import DISPLAY_TRANSFORM, OBJECT_COVERAGE, mean_or_none, psnr
 from mirrorbake.files import write_text
-from mirrorbake.metrics import DISPLAY_TRANSFORM, OBJECT_COVERAGE, mean_or_none, psnr
-from mirrorbake.run_time import CONTENDERS, RunTime, images_of_trace
-from mirrorbake.scene import hash_inputs, prepare_stage
-from mirrorbake.store import PemStore, Source
+from mirrorbake.pem.opened import OpenedPem, open_pem
+from mirrorbake.pem.store import PemStore, Timings
+from mirrorbake.pem.view_images import ViewImages, images_of_trace
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from mirrorbake import _core
-    from mirrorbake.bake import ProgressReport
-    from mirrorbake.metrics import FloatArray
-    from mirrorbake.scene import Stage
-    from mirrorbake.store import Timings, ViewImages
+    from mirrorbake.bake.bake import ProgressReport
+    from mirrorbake.scene.stage import Stage
 
 METRICS_NAME = "metrics.json"
-
-
-@dataclass(frozen=True)
-class OpenedPem:
-    """A complete PEM together with the scene it was baked from."""
-
-    store: PemStore
-    stage: Stage
-    run_time: RunTime
-
-    @property
-    def parameters(self) -> list[float]:
-        """Parameter t of every sampled view."""
-        return self.store.header.parameters
-
-
-def open_pem(directory: Path, stage: Stage | None = None) -> OpenedPem:
-    """Open a complete PEM and build its scene again, to look at it from new views.
-
-    Parameters
-    ----------
-    directory
-        Where the PEM is.
-    stage
-        Its scene, if it has been prepared already.
-
-    Raises
-    ------
-    StoreError
-        There is no complete PEM, or a file that its scene uses has changed.
-    InputError
-        A file that its scene uses is gone.
-    """
-    store = PemStore.open(directory)
-    store.require_complete()
-    source = store.header.source
-    config = parse_config(source.config, str(directory))
-    present = Source(source.library, source.config, hash_inputs(config))
-    if present.fingerprint != source.fingerprint:
-        raise StoreError(f"{directory}: its scene has changed ({present.difference_from(source)})")
-    stage = (stage or prepare_stage(config)).planned(store.header.plan)
-    return OpenedPem(store, stage, RunTime(store, stage.built.triangles))
 
 
 @dataclass(frozen=True)
@@ -182,12 +137,6 @@ def _evaluate_between(pem: OpenedPem, t: float) -> ViewMetrics:
     trace_s = time.perf_counter() - start
     values = compare(pem, t, trace.samples, images_of_trace(trace))
     return ViewMetrics(t, False, trace_s, None, None, values)
-
-
-def render_contenders(pem: OpenedPem, t: float, samples: _core.SurfaceSamples) -> dict[str, FloatArray]:
-    """Draw the reflector with every contender that exists: radiance (H, W, 3) by name."""
-    names = [name for name in CONTENDERS if name != "static_proxy" or pem.run_time.has_static_proxy]
-    return {name: pem.run_time.render(name, t, samples) for name in names}
 
 
 def compare(

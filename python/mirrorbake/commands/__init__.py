@@ -1,0 +1,1 @@
+"""The command `mirrorbake`, one module per subcommand."""

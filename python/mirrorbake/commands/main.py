@@ -1,0 +1,54 @@
+"""The command line. Data goes to stdout, progress and messages to stderr.
+
+Exit status: 0 success, 2 wrong usage, 3 bad files, 4 a computation that cannot give an answer, 130
+interrupted. Commands import what they need themselves: `--help` should not wait for Zarr and matplotlib.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from mirrorbake import _core
+from mirrorbake.commands.analyze import analyze_command
+from mirrorbake.commands.bake import bake_command
+from mirrorbake.commands.demo import demo_command
+from mirrorbake.commands.evaluate import evaluate_command
+from mirrorbake.commands.render import render_command
+from mirrorbake.commands.study import app as study_app
+
+app = typer.Typer(
+    name="mirrorbake",
+    help="Bake the reflections of shiny objects into parameterized environment maps.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("bake")(bake_command)
+app.command("analyze")(analyze_command)
+app.command("evaluate")(evaluate_command)
+app.command("render")(render_command)
+app.command("demo")(demo_command)
+app.add_typer(study_app, name="study")
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"mirrorbake {_core.version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line; never returns."""
+    app()

@@ -1,0 +1,118 @@
+"""Studies: what each approximation costs and how far off it is, measured in one run."""
+
+from __future__ import annotations
+
+import json as json_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from mirrorbake import _core
+from mirrorbake.commands.errors import reports_errors
+from mirrorbake.errors import OptionError
+
+app = typer.Typer(help="Measure what approximations cost and how far off they are.", no_args_is_help=True)
+
+
+Json = Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for plots. [default: none]")]
+
+
+@app.callback()
+def _root() -> None:
+    pass
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+@app.command("fresnel")
+@reports_errors
+def fresnel_command(
+    json: Json = False,
+    out: Out = None,
+    max_error: Annotated[float, typer.Option("--max-error", help="What tables are made for.")] = 1e-3,
+    samples: Annotated[
+        int, typer.Option("--samples", min=10, max=100_000, help="Cosines per curve compared with 50 digits.")
+    ] = 200,
+    threads: Annotated[
+        int, typer.Option("--threads", min=0, max=1024, metavar="N", help="Threads at most; 0: all cores.")
+    ] = 0,
+) -> None:
+    """Error and time of the Fresnel models: rounding, Schlick, tables, metals."""
+    from mirrorbake.study import fresnel
+
+    limit = _core.ThreadLimit(threads)
+    try:
+        result = fresnel.study(max_error, samples)
+    except _core.InvalidArgument as failure:
+        raise OptionError(str(failure)) from None
+    del limit
+    if out is not None:
+        for path in fresnel.plot(result, out):
+            typer.echo(f"wrote {path}", err=True)
+    if json:
+        typer.echo(json_module.dumps(result))
+    else:
+        _print_fresnel(result)
+
+
+def _print_fresnel(result: dict[str, Any]) -> None:
+    console = Console(highlight=False, width=max(Console().width, 100))
+    table = Table(
+        *("material", "float32 error", "ns", "Schlick error", "ns", "entries", "table error", "ns"),
+        title=f"Against the full equations in float64; {result['isa']}, {result['threads']} threads",
+    )
+    for row in result["approximations"]:
+        size = "-" if row["table_size"] is None else str(row["table_size"])
+        table.add_row(
+            row["material"],
+            *(_number(row[key]) for key in ("exact_error", "exact_ns", "schlick_error", "schlick_ns")),
+            size,
+            *(_number(row[key]) for key in ("table_error", "table_ns")),
+        )
+    console.print(table)
+    table = Table(
+        *("material", "precision", "largest error", "part of the allowance"),
+        title=f"Against {result['digits']} digits; allowed: 4 ulp + 1e-7 (float32), 4 ulp + 1e-15 (float64)",
+    )
+    for curve in result["rounding"]:
+        errors = (curve["max_error"], curve["share_of_allowance"])
+        table.add_row(curve["material"], curve["dtype"], *(_number(error) for error in errors))
+    console.print(table)
+
+
+@app.command("proxy")
+@reports_errors
+def proxy_command(
+    json: Json = False,
+    out: Out = None,
+    samples: Annotated[
+        int, typer.Option("--samples", min=2, max=100_000, help="Rays per shape, flatness and depth.")
+    ] = 30,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the random rays.")] = 1,
+) -> None:
+    """Error of lookups on proxies, in float32 and float64, against 50 digits."""
+    from mirrorbake.study import proxy
+
+    errors = proxy.proxy_errors(samples, seed)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        proxy.plot(errors, out / "proxy-errors.png")
+        typer.echo(f"wrote {out / 'proxy-errors.png'}", err=True)
+    if json:
+        typer.echo(json_module.dumps(proxy.as_json(errors)))
+        return
+    table = Table("shape", "aspect", "arithmetic", "largest error, radians", "mean")
+    groups: dict[tuple[str, float, str], list[proxy.ProxyError]] = {}
+    for error in errors:
+        groups.setdefault((error.shape, error.aspect, error.arithmetic), []).append(error)
+    for (shape, aspect, arithmetic), group in groups.items():
+        mean = sum(error.mean for error in group) / len(group)
+        largest = max(error.largest for error in group)
+        table.add_row(shape, f"{aspect:g}", arithmetic, _number(largest), _number(mean))
+    Console(highlight=False).print(table)

@@ -1,0 +1,59 @@
+"""A PEM with its scene, to be looked at from new views."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mirrorbake.errors import StoreError
+from mirrorbake.pem.header import Source
+from mirrorbake.pem.run_time import RunTime
+from mirrorbake.pem.store import PemStore
+from mirrorbake.scene.inputs import hash_inputs
+from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.stage import Stage, prepare_stage
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class OpenedPem:
+    """A complete PEM together with the scene it was baked from."""
+
+    store: PemStore
+    stage: Stage
+    run_time: RunTime
+
+    @property
+    def parameters(self) -> list[float]:
+        """Parameter t of every sampled view."""
+        return self.store.header.parameters
+
+
+def open_pem(directory: Path, stage: Stage | None = None) -> OpenedPem:
+    """Open a complete PEM and build its scene again, to look at it from new views.
+
+    Parameters
+    ----------
+    directory
+        Where the PEM is.
+    stage
+        Its scene, if it has been prepared already.
+
+    Raises
+    ------
+    StoreError
+        There is no complete PEM, or a file that its scene uses has changed.
+    InputError
+        A file that its scene uses is gone.
+    """
+    store = PemStore.open(directory)
+    store.require_complete()
+    source = store.header.source
+    config = parse_config(source.config, str(directory))
+    present = Source(source.library, source.config, hash_inputs(config))
+    if present.fingerprint != source.fingerprint:
+        raise StoreError(f"{directory}: its scene has changed ({present.difference_from(source)})")
+    stage = (stage or prepare_stage(config)).planned(store.header.plan)
+    return OpenedPem(store, stage, RunTime(store, stage.built.triangles))

@@ -1,0 +1,56 @@
+"""Ray-traced images of a view, as a PEM keeps them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mirrorbake import _core
+    from mirrorbake.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class ViewImages:
+    """Ray-traced images of one view, float32."""
+
+    object: FloatArray
+    """(H, W, 3) radiance of the object, mean over the samples that see it; 0 elsewhere."""
+    coverage: FloatArray
+    """(H, W) fraction of the pixel's samples that see the object."""
+    background: FloatArray
+    """(H, W, 3) radiance of the others, times their fraction."""
+
+    def composite(self, object_radiance: FloatArray) -> FloatArray:
+        """The whole picture with another rendering (H, W, 3) of the object in it."""
+        return self.background + self.coverage[..., None] * object_radiance
+
+    @property
+    def beauty(self) -> FloatArray:
+        """The ray-traced picture (H, W, 3)."""
+        return self.composite(self.object)
+
+
+def images_of_trace(trace: _core.LayerTrace) -> ViewImages:
+    """Separate the object from what is behind it in a ray-traced view."""
+    samples = trace.samples
+    shape = (samples.height, samples.width)
+    pixel = np.asarray(samples.pixel)
+    count = np.bincount(pixel, minlength=shape[0] * shape[1])
+    beauty = np.asarray(trace.sample_beauty)
+    total = np.stack(
+        [np.bincount(pixel, weights=beauty[:, c], minlength=count.size) for c in range(3)], axis=-1
+    )
+    coverage = (count / samples.samples_per_pixel).reshape(shape)
+    light = (total / np.maximum(count, 1)[:, None]).reshape(*shape, 3)
+    channels = list(trace.channels)
+    picture = np.asarray(trace.layers)[..., [channels.index(name) for name in "RGB"]]
+    # Where the object covers the whole pixel the difference is rounding, not light.
+    background = np.where(coverage[..., None] < 1.0, picture - coverage[..., None] * light, 0.0)
+    return ViewImages(
+        object=light.astype(np.float32),
+        coverage=coverage.astype(np.float32),
+        background=np.maximum(background, 0.0).astype(np.float32),
+    )

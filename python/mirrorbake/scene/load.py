@@ -1,0 +1,184 @@
+"""Reading scene files, with errors that name the key. Relative paths are relative to the file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from mirrorbake.errors import InputError, OptionError
+from mirrorbake.scene.config import PATH_KEYS, SceneConfig
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+MAX_SCENE_BYTES = 1 << 20
+_EXPECTATIONS = {
+    "extra_forbidden": "is not a key of this section",
+    "missing": "is required",
+    "model_type": "should be a section",
+}
+
+
+def _describe(error: ErrorDetails) -> str:
+    # Steps such as 'function-before[...]' are pydantic's own, not keys of the file.
+    key = ".".join(str(step) for step in error["loc"] if "[" not in str(step))
+    kind = error["type"]
+    if kind in _EXPECTATIONS:
+        return f"{key}: {_EXPECTATIONS[kind]}"
+    message = error["msg"].removeprefix("Value error, ").replace("Input should", "should")
+    if isinstance(error["input"], Mapping):
+        return f"{key}: {message}"
+    return f"{key} = {error['input']!r}: {message}"
+
+
+def _describe_all(errors: Sequence[ErrorDetails]) -> str:
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    return _describe(errors[0]) + more
+
+
+def parse_config(data: Mapping[str, Any], source: str) -> SceneConfig:
+    """Validate a scene given as nested mappings.
+
+    Parameters
+    ----------
+    data
+        What a TOML parser gives for a scene file.
+    source
+        Name that error messages start with.
+
+    Raises
+    ------
+    InputError
+        Names the first wrong key, its value and what was expected.
+
+    Examples
+    --------
+    >>> parse_config({"maps": {"size": 128}}, "example").maps.size
+    128
+    >>> parse_config({"maps": {"size": 100}}, "example")
+    Traceback (most recent call last):
+    mirrorbake.errors.InputError: example: maps.size = 100: should be a power of two
+    """
+    try:
+        return SceneConfig.model_validate(data)
+    except ValidationError as failure:
+        raise InputError(f"{source}: {_describe_all(failure.errors())}") from None
+
+
+def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
+    """Split `section.key=value` into the key path and the value, read as TOML or else as a plain string.
+
+    Examples
+    --------
+    >>> parse_override("maps.size=128")
+    (('maps', 'size'), 128)
+    >>> parse_override("reflector.mesh=bunny.obj")
+    (('reflector', 'mesh'), 'bunny.obj')
+    """
+    key, separator, value = text.partition("=")
+    path = tuple(step.strip() for step in key.split("."))
+    if not separator or len(path) < 2 or not all(path):
+        raise OptionError(f"--set {text!r}: expected section.key=value")
+    try:
+        return path, tomllib.loads(f"value = {value.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        return path, value.strip()
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        size = path.stat().st_size
+        if size > MAX_SCENE_BYTES:
+            raise InputError(f"{path}: {size} bytes, a scene file has at most {MAX_SCENE_BYTES}")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as failure:
+        raise InputError(f"{path}: {failure.strerror or failure}") from None
+    except UnicodeDecodeError as failure:
+        raise InputError(f"{path}: not UTF-8 text (byte {failure.start})") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as failure:
+        raise InputError(f"{path}: not valid TOML: {failure}") from None
+
+
+def load_config(path: Path, overrides: Sequence[tuple[tuple[str, ...], Any]] = ()) -> SceneConfig:
+    """Read and validate a scene file.
+
+    Parameters
+    ----------
+    path
+        The TOML file. Relative paths in it are resolved against its folder.
+    overrides
+        Key paths with values that replace the file's, as of `parse_override`; relative paths in them are
+        resolved against the current folder. An override of `reflector.mesh` drops `reflector.object`, and so
+        on.
+
+    Raises
+    ------
+    InputError
+        The file is missing or not TOML, or a key is wrong. It is an OptionError if the key, or one that it
+        does not go with, is an override.
+    """
+    data = _read_toml(path)
+    _resolve_paths(data, path.resolve().parent)
+    replacements: dict[str, Any] = {}
+    for keys, value in overrides:
+        _insert(replacements, keys, value)
+    _resolve_paths(replacements, Path.cwd())
+    _merge(data, replacements)
+    try:
+        return SceneConfig.model_validate(data)
+    except ValidationError as failure:
+        errors = failure.errors()
+        if any(_concerns(errors[0], keys) for keys, _ in overrides):
+            raise OptionError(_describe_all(errors)) from None
+        raise InputError(f"{path}: {_describe_all(errors)}") from None
+
+
+def _concerns(error: ErrorDetails, keys: tuple[str, ...]) -> bool:
+    place = error["loc"]
+    shared = min(len(place), len(keys))
+    return shared > 0 and place[:shared] == keys[:shared]
+
+
+# What a new value of a key makes meaningless.
+_ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
+    "reflector.mesh": ("object", "scene_object"),
+    "reflector.object": ("mesh", "scene_object"),
+    "reflector.scene_object": ("object", "mesh"),
+    "material.fresnel": ("r0", "ior", "eta", "k", "metal"),
+    "material.metal": ("eta", "k"),
+    "material.eta": ("metal",),
+    "material.k": ("metal",),
+    "surroundings.panorama": ("room",),
+    "surroundings.scene": ("room", "ground"),
+    "surroundings.room": ("panorama", "scene", "ground"),
+}
+
+
+def _insert(data: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
+    for key in keys[:-1]:
+        data = data.setdefault(key, {})
+        if not isinstance(data, dict):
+            raise OptionError(f"--set {'.'.join(keys)}: {key} is not a section")
+    data[keys[-1]] = value
+
+
+def _merge(data: dict[str, Any], replacements: Mapping[str, Any], path: tuple[str, ...] = ()) -> None:
+    for key, value in replacements.items():
+        if isinstance(value, Mapping) and isinstance(data.get(key), dict):
+            _merge(data[key], value, (*path, key))
+            continue
+        data[key] = value
+        for other in _ALTERNATIVES.get(".".join((*path, key)), ()):
+            if other not in replacements:
+                data.pop(other, None)
+
+
+def _resolve_paths(data: Mapping[str, Any], folder: Path) -> None:
+    for section, key in PATH_KEYS:
+        table = data.get(section)
+        if isinstance(table, dict) and isinstance(table.get(key), str):
+            table[key] = str(folder / table[key])

@@ -151,118 +151,6 @@ void bind_shapes(nb::module_& m) {
       "missing, corrupt, empty or refers to files outside its directory.");
 }
 
-void bind_texture(nb::module_& m) {
-  nb::enum_<TextureWrap>(m, "TextureWrap", "How a coordinate outside [0,1] finds a texel.")
-      .value("repeat", TextureWrap::repeat, "tiled")
-      .value("clamp", TextureWrap::clamp, "the border's")
-      .value("mirror", TextureWrap::mirror, "tiled, every second tile mirrored");
-  nb::enum_<Transfer>(m, "Transfer", "Whether the values of an image file are decoded from sRGB.")
-      .value("automatic", Transfer::automatic, "integers are, unless the file says that it is linear")
-      .value("srgb", Transfer::srgb)
-      .value("linear", Transfer::linear);
-  m.def("set_texture_cache_bytes", &set_texture_cache_bytes, nb::arg("bytes"),
-        "Bound the cache of all texture files together; 1 GiB until it is set, at least 16 MiB.");
-  nb::class_<TextureReference>(
-      m, "TextureReference",
-      "A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of\n"
-      "KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation` "
-      "radians\n"
-      "about (0, 0), then moved.")
-      .def(
-          "__init__",
-          [](TextureReference* self, int texture, glm::vec2 offset, glm::vec2 scale, float rotation) {
-            new (self) TextureReference{texture, offset, scale, rotation};
-          },
-          nb::arg("texture") = -1, nb::arg("offset") = glm::vec2(0.0F), nb::arg("scale") = glm::vec2(1.0F),
-          nb::arg("rotation") = 0.0F)
-      .def_rw("texture", &TextureReference::texture)
-      .def_rw("offset", &TextureReference::offset)
-      .def_rw("scale", &TextureReference::scale)
-      .def_rw("rotation", &TextureReference::rotation)
-      .def(
-          "__eq__",
-          [](const TextureReference& self, nb::handle other) {
-            return nb::isinstance<TextureReference>(other) &&
-                   self == nb::cast<const TextureReference&>(other);
-          },
-          nb::arg("other"))
-      .def("__repr__", [](const TextureReference& r) {
-        return "TextureReference(" + std::to_string(r.texture) + ", offset=" + text_of(r.offset) +
-               ", scale=" + text_of(r.scale) + ", rotation=" + text_of(r.rotation) + ")";
-      });
-}
-
-void bind_material(nb::module_& m) {
-  nb::enum_<FresnelModel>(m, "FresnelModel", "How the reflectance of a mirror depends on the angle.")
-      .value("constant", FresnelModel::constant, "r0 at every angle")
-      .value("schlick", FresnelModel::schlick, "Schlick's approximation from r0")
-      .value("dielectric", FresnelModel::dielectric, "unpolarised, relative index eta")
-      .value("conductor", FresnelModel::conductor, "unpolarised, complex index eta + i k");
-  nb::class_<Fresnel>(m, "Fresnel", "Reflectance per colour channel as a function of the angle.")
-      .def(
-          "__init__",
-          [](Fresnel* self, FresnelModel model, glm::vec3 r0, glm::vec3 eta, glm::vec3 k) {
-            new (self) Fresnel{model, r0, eta, k};
-          },
-          nb::arg("model") = FresnelModel::constant, nb::arg("r0") = glm::vec3(0.0F),
-          nb::arg("eta") = glm::vec3(1.5F), nb::arg("k") = glm::vec3(0.0F))
-      .def_rw("model", &Fresnel::model)
-      .def_rw("r0", &Fresnel::r0,
-              "constant: reflectance; schlick: reflectance at normal incidence; in [0, 1]")
-      .def_rw("eta", &Fresnel::eta, "dielectric, conductor: real part of the relative index, above 0")
-      .def_rw("k", &Fresnel::k, "conductor: extinction coefficient, at least 0");
-
-  nb::enum_<LayerModel>(m, "LayerModel", "How diffuse light L_d and mirrored light L_m add up.")
-      .value("additive", LayerModel::additive, "F L_m + L_d")
-      .value("coated", LayerModel::coated, "F L_m + (1 − F) L_d");
-  nb::enum_<SpecularLobe>(m, "SpecularLobe", "Shape of the specular lobe about the mirror direction.")
-      .value("mirror", SpecularLobe::mirror, "a perfect mirror")
-      .value("ggx", SpecularLobe::ggx, "microfacets after Trowbridge and Reitz, of `roughness` α")
-      .value("phong", SpecularLobe::phong, "(r·l)^N, normalised, of `exponent` N");
-  nb::class_<Material>(m, "Material", "What a surface does with light.")
-      .def(
-          "__init__",
-          [](Material* self, std::string name, glm::vec3 albedo, const TextureReference& albedo_texture,
-             bool specular, const Fresnel& fresnel, const TextureReference& specular_texture,
-             SpecularLobe lobe, float roughness, const TextureReference& roughness_texture, float exponent,
-             LayerModel layers, glm::vec3 emission, const TextureReference& emission_texture, float opacity,
-             const TextureReference& opacity_texture, std::optional<float> opacity_cutoff) {
-            new (self)
-                Material{std::move(name),  albedo,   albedo_texture,   specular,          fresnel,
-                         specular_texture, lobe,     roughness,        roughness_texture, exponent,
-                         layers,           emission, emission_texture, opacity,           opacity_texture,
-                         opacity_cutoff};
-          },
-          nb::kw_only(), nb::arg("name") = "", nb::arg("albedo") = glm::vec3(0.5F),
-          nb::arg("albedo_texture") = TextureReference{}, nb::arg("specular") = false,
-          nb::arg("fresnel") = Fresnel{}, nb::arg("specular_texture") = TextureReference{},
-          nb::arg("lobe") = SpecularLobe::mirror, nb::arg("roughness") = Material{}.roughness,
-          nb::arg("roughness_texture") = TextureReference{}, nb::arg("exponent") = Material{}.exponent,
-          nb::arg("layers") = LayerModel::additive, nb::arg("emission") = glm::vec3(0.0F),
-          nb::arg("emission_texture") = TextureReference{}, nb::arg("opacity") = 1.0F,
-          nb::arg("opacity_texture") = TextureReference{}, nb::arg("opacity_cutoff") = nb::none())
-      .def_rw("name", &Material::name)
-      .def_rw("albedo", &Material::albedo, "Lambertian reflectance per channel, in [0, 1]")
-      .def_rw("albedo_texture", &Material::albedo_texture, "multiplies `albedo`")
-      .def_rw("specular", &Material::specular, "whether it has a specular lobe, weighted by `fresnel`")
-      .def_rw("fresnel", &Material::fresnel)
-      .def_rw("specular_texture", &Material::specular_texture,
-              "multiplies the `r0` of a constant or Schlick's reflectance")
-      .def_rw("lobe", &Material::lobe)
-      .def_rw("roughness", &Material::roughness, "of the lobe `ggx`: its α, in (0, 1]")
-      .def_rw("roughness_texture", &Material::roughness_texture, "its first channel multiplies `roughness`")
-      .def_rw("exponent", &Material::exponent, "of the lobe `phong`: N, in [1, 1e6]")
-      .def_rw("layers", &Material::layers)
-      .def_rw("emission", &Material::emission, "radiance emitted on the front side, W sr⁻¹ m⁻²")
-      .def_rw("emission_texture", &Material::emission_texture, "multiplies `emission`")
-      .def_rw("opacity", &Material::opacity,
-              "part of the surface that is there, in [0, 1]: rays pass between")
-      .def_rw("opacity_texture", &Material::opacity_texture,
-              "its first channel multiplies `opacity`; its texels have to be in memory")
-      .def_rw("opacity_cutoff", &Material::opacity_cutoff,
-              "None, or: all is there where the opacity is at least this, nothing elsewhere");
-}
-
 void bind_visibility(nb::module_& m) {
   nb::enum_<Visibility>(m, "Visibility", nb::is_flag(), "A set of the kinds of rays that see an object.")
       .value("none", Visibility::none)
@@ -332,8 +220,6 @@ void bind_loaded_scene(nb::module_& m) {
 void bind_scene(nb::module_& m) {
   bind_mesh(m);
   bind_shapes(m);
-  bind_texture(m);
-  bind_material(m);
   bind_visibility(m);
 
   nb::class_<Scene>(

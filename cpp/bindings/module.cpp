@@ -7,6 +7,7 @@ void bind_core(nb::module_& m);
 void bind_proxy(nb::module_& m);
 void bind_envmap(nb::module_& m);
 void bind_image(nb::module_& m);
+void bind_material(nb::module_& m);
 void bind_scene(nb::module_& m);
 void bind_tracer(nb::module_& m);
 void bind_projection(nb::module_& m);
@@ -22,6 +23,7 @@ NB_MODULE(_core, m) {
   bind_core(m);
   bind_proxy(m);
   bind_image(m);
+  bind_material(m);
   bind_scene(m);
   bind_tracer(m);
   bind_projection(m);

@@ -1,5 +1,6 @@
 """The shape of the source tree: who may include whom, and how large a file may grow."""
 
+import ast
 import re
 import subprocess
 from collections.abc import Iterator
@@ -34,8 +35,14 @@ OWNERS = {
     "tiny_obj_loader": ("scene",),
 }
 
+# What each part of the Python package may import from other parts, in the order in which they build on each other; the
+# flat modules are the toolbox, which all may use.
+PYTHON_FLOORS = ("scene", "pem", "bake", "evaluate", "study", "viewer", "commands")
+
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 MAX_LINES = 600
+MAX_LIBRARY_LINES = {".py": 400, ".cpp": 500, ".hpp": 500}
+"""Of the library's own files."""
 
 
 def tracked_files() -> list[Path]:
@@ -100,6 +107,35 @@ def test_link_lines_follow_the_direction_of_dependencies() -> None:
     assert not violations
 
 
+def python_imports() -> Iterator[tuple[Path, str]]:
+    """File and imported module, of every import of the package from itself, those for annotations included."""
+    package = ROOT / "python" / "mirrorbake"
+    for path in sorted(package.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module is not None:
+                names = [f"{node.module}.{alias.name}" for alias in node.names]
+            elif isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            else:
+                continue
+            for name in names:
+                if name.startswith("mirrorbake."):
+                    yield path.relative_to(package), name
+
+
+def python_floor(name: str) -> int:
+    return PYTHON_FLOORS.index(name) if name in PYTHON_FLOORS else -1
+
+
+def test_python_imports_go_down_or_stay() -> None:
+    violations = [
+        f"{path} imports {imported}"
+        for path, imported in python_imports()
+        if path.name != "__main__.py" and python_floor(imported.split(".")[1]) > python_floor(path.parts[0])
+    ]
+    assert not violations
+
+
 @pytest.mark.parametrize("library", OWNERS)
 def test_third_party_library_stays_behind_its_module(library: str) -> None:
     headers = CPP / "include"
@@ -128,6 +164,17 @@ def test_no_source_file_is_too_long_to_read() -> None:
         str(path.relative_to(ROOT)): lines
         for path, text in text_files()
         if path.suffix in suffixes and (lines := text.count("\n")) > MAX_LINES
+    }
+    assert not too_long
+
+
+def test_no_file_of_the_library_is_two() -> None:
+    too_long = {
+        str(path.relative_to(ROOT)): lines
+        for path, text in text_files()
+        if path.is_relative_to(ROOT / "python") or path.is_relative_to(CPP)
+        if not path.is_relative_to(CPP / "tools")
+        if path.suffix in MAX_LIBRARY_LINES and (lines := text.count("\n")) > MAX_LIBRARY_LINES[path.suffix]
     }
     assert not too_long
 

@@ -12,26 +12,10 @@
 #include "bilinear_mean.hpp"
 #include "coverage.hpp"
 #include "resample_job.hpp"
+#include "straight_texels.hpp"
 #include "tap.hpp"
 
 namespace mirrorbake {
-
-/// None of a map of few texels is straight enough: that its corners make a parallelogram says nothing of edges that
-/// bend alike.
-StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& target);
-bool is_straight(const Quad& quad, const StraightLimits& limits);
-
-/// Length, in texels of the source, of a texel that covers `area` of them and whose sides' squares add up to
-/// `squares`; the width of a long one (ResampleKernels::classify()).
-double texel_side(double area, double squares);
-
-/// How much of `automatic` is interpolation for texels that many of the source's long. At less than one texel
-/// of the source nothing is left to alias, so that the change is quick.
-double interpolated_share(double side);
-
-/// How much of that is left at a place of a sphere map as source, in texels: less near its rim, where the next texel may be
-/// beyond it, and interpolation would hand flux out to what has none.
-double interpolable(const EnvMapLayout& sphere_map, glm::dvec2 position);
 
 /// Texels whose image in the source is not a quadrilateral on one face: around poles and other singularities,
 /// across the edges of faces, on the rim of a round map, or large. In a panorama the outline of the image is traced

@@ -411,19 +411,16 @@ InvalidArgument
     Arrays of different length, fewer than 16 rays, values that are not usable (the index is named).)");
   m.def(
       "hull_triangles",
-      [](PointArray positions, TriangleArray triangles, std::optional<PointArray> extremes,
-         double tolerance) {
+      [](PointArray positions, TriangleArray triangles, double tolerance) {
         const std::span indices(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0));
-        const std::span<const glm::vec3> hull = extremes ? points(*extremes) : std::span<const glm::vec3>{};
         std::vector<std::uint8_t> on_hull;
         {
           nb::gil_scoped_release release;
-          on_hull = hull_triangles(points(positions), indices, hull, tolerance);
+          on_hull = hull_triangles(points(positions), indices, tolerance);
         }
         return to_numpy(std::move(on_hull), {indices.size()});
       },
-      nb::arg("positions"), nb::arg("triangles"), nb::arg("extremes") = nb::none(),
-      nb::arg("tolerance") = kHullTolerance,
+      nb::arg("positions"), nb::arg("triangles"), nb::arg("tolerance") = kHullTolerance,
       "1 for every triangle that lies on the mesh's convex hull, else 0; see "
       "mirrorbake.proxy.hull_triangles.");
 }

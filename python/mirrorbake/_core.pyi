@@ -277,7 +277,7 @@ def choose_proxy(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 
         Arrays of different length, fewer than 16 rays, values that are not usable (the index is named).
     """
 
-def hull_triangles(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], extremes: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, tolerance: float = 0.0001) -> NDArray[numpy.uint8]:
+def hull_triangles(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], tolerance: float = 0.0001) -> NDArray[numpy.uint8]:
     """
     1 for every triangle that lies on the mesh's convex hull, else 0; see mirrorbake.proxy.hull_triangles.
     """
@@ -310,81 +310,6 @@ def save_image(path: str, pixels: Annotated[NDArray[numpy.float32], dict(shape=(
     Write scene-linear pixels of shape (height, width, channels) atomically; the extension of the path decides the
     format. `channels` names the channels (default Y, YA, RGB or RGBA). `format`: automatic, half, float32, uint8
     or uint16. Raises FileError and InvalidArgument.
-    """
-
-class TriangleMesh:
-    """
-    Triangles with optional vertex normals, texture coordinates and parts. World space, metres.
-    """
-
-    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, parts: Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None:
-        """
-        Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from outside, unit
-        normals (V, 3) (default: flat shading), uvs (V, 2) with v up, and the part of each triangle (T,). Raises
-        InvalidArgument for anything not finite, indices out of range or a mesh without area.
-        """
-
-    @property
-    def positions(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """Vertices, (V, 3), a read-only view."""
-
-    @property
-    def normals(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """Unit vertex normals, (V, 3), or (0, 3) for flat shading."""
-
-    @property
-    def uvs(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """Texture coordinates, (V, 2), v up, or (0, 2)."""
-
-    @property
-    def triangles(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
-        """Vertex indices, (T, 3)."""
-
-    @property
-    def parts(self) -> Annotated[NDArray[numpy.uint16], dict(writable=False)]:
-        """Part of each triangle, (T,), or (0,) if all belong to part 0."""
-
-    def __repr__(self) -> str: ...
-
-def bounds(mesh: TriangleMesh) -> tuple[Sequence[float], Sequence[float]]:
-    """Smallest and largest coordinates of a mesh's vertices."""
-
-def make_teapot(subdivisions: int = 25, height: float = 0.15000000596046448) -> TriangleMesh:
-    """
-    The Utah teapot of 32 Bezier patches, `subdivisions`² × 2 triangles each (1 to 512; 25 gives the 40,000 of
-    [PEM] §6), `height` metres high, standing on y = 0 with the spout along +X. Parts: 0 body, 1 lid.
-    """
-
-def teapot_part_names() -> list[str]:
-    """Names of the teapot's parts, in order."""
-
-def make_box(min: Sequence[float], max: Sequence[float]) -> TriangleMesh:
-    """Box with axis-aligned sides, each with texture coordinates 0 to 1."""
-
-def make_sphere(centre: Sequence[float], radius: float, segments: int = 48) -> TriangleMesh:
-    """
-    Latitude-longitude sphere with `segments` (3 to 4096) around the equator.
-    """
-
-def make_cylinder(base: Sequence[float], radius: float, height: float, segments: int = 48) -> TriangleMesh:
-    """Upright closed cylinder; `base` is the centre of its lower cap."""
-
-def make_cone(base: Sequence[float], radius: float, height: float, segments: int = 48) -> TriangleMesh:
-    """Upright closed cone; `base` is the centre of its base."""
-
-def make_torus(centre: Sequence[float], ring_radius: float, tube_radius: float, segments: int = 48) -> TriangleMesh:
-    """Torus about the vertical axis through `centre`."""
-
-def make_rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> TriangleMesh:
-    """
-    Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.
-    """
-
-def load_mesh(path: str) -> TriangleMesh:
-    """
-    Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied (instances
-    become copies) and missing vertex normals made by angle-weighted averaging. Raises FileError if the file is
-    missing, corrupt, empty or refers to files outside its directory.
     """
 
 class TextureWrap(enum.Enum):
@@ -637,6 +562,81 @@ class Material:
 
     @opacity_cutoff.setter
     def opacity_cutoff(self, arg: float | None, /) -> None: ...
+
+class TriangleMesh:
+    """
+    Triangles with optional vertex normals, texture coordinates and parts. World space, metres.
+    """
+
+    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, parts: Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None:
+        """
+        Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from outside, unit
+        normals (V, 3) (default: flat shading), uvs (V, 2) with v up, and the part of each triangle (T,). Raises
+        InvalidArgument for anything not finite, indices out of range or a mesh without area.
+        """
+
+    @property
+    def positions(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """Vertices, (V, 3), a read-only view."""
+
+    @property
+    def normals(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """Unit vertex normals, (V, 3), or (0, 3) for flat shading."""
+
+    @property
+    def uvs(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """Texture coordinates, (V, 2), v up, or (0, 2)."""
+
+    @property
+    def triangles(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
+        """Vertex indices, (T, 3)."""
+
+    @property
+    def parts(self) -> Annotated[NDArray[numpy.uint16], dict(writable=False)]:
+        """Part of each triangle, (T,), or (0,) if all belong to part 0."""
+
+    def __repr__(self) -> str: ...
+
+def bounds(mesh: TriangleMesh) -> tuple[Sequence[float], Sequence[float]]:
+    """Smallest and largest coordinates of a mesh's vertices."""
+
+def make_teapot(subdivisions: int = 25, height: float = 0.15000000596046448) -> TriangleMesh:
+    """
+    The Utah teapot of 32 Bezier patches, `subdivisions`² × 2 triangles each (1 to 512; 25 gives the 40,000 of
+    [PEM] §6), `height` metres high, standing on y = 0 with the spout along +X. Parts: 0 body, 1 lid.
+    """
+
+def teapot_part_names() -> list[str]:
+    """Names of the teapot's parts, in order."""
+
+def make_box(min: Sequence[float], max: Sequence[float]) -> TriangleMesh:
+    """Box with axis-aligned sides, each with texture coordinates 0 to 1."""
+
+def make_sphere(centre: Sequence[float], radius: float, segments: int = 48) -> TriangleMesh:
+    """
+    Latitude-longitude sphere with `segments` (3 to 4096) around the equator.
+    """
+
+def make_cylinder(base: Sequence[float], radius: float, height: float, segments: int = 48) -> TriangleMesh:
+    """Upright closed cylinder; `base` is the centre of its lower cap."""
+
+def make_cone(base: Sequence[float], radius: float, height: float, segments: int = 48) -> TriangleMesh:
+    """Upright closed cone; `base` is the centre of its base."""
+
+def make_torus(centre: Sequence[float], ring_radius: float, tube_radius: float, segments: int = 48) -> TriangleMesh:
+    """Torus about the vertical axis through `centre`."""
+
+def make_rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> TriangleMesh:
+    """
+    Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.
+    """
+
+def load_mesh(path: str) -> TriangleMesh:
+    """
+    Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied (instances
+    become copies) and missing vertex normals made by angle-weighted averaging. Raises FileError if the file is
+    missing, corrupt, empty or refers to files outside its directory.
+    """
 
 class Visibility(enum.Flag):
     """A set of the kinds of rays that see an object."""

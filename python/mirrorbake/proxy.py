@@ -10,13 +10,11 @@ direction of that point as seen from the map's origin:
 [[3.0, 0.0, 0.0]]
 """
 
-import contextlib
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from mirrorbake import _core
 from mirrorbake._core import (
@@ -73,13 +71,7 @@ def hull_triangles(
     InvalidArgument
         Indices out of range, coordinates that are not finite, a negative tolerance.
     """
-    extremes = positions
-    if len(positions) > 64 and np.all(np.isfinite(positions)):
-        # A plane that has any vertex in front has one of the hull's in front: test against those only. Flat
-        # meshes have no hull with a volume and are tested against all vertices.
-        with contextlib.suppress(QhullError):
-            extremes = positions[ConvexHull(positions).vertices]
-    return _core.hull_triangles(positions, triangles, extremes, tolerance).astype(np.bool_)
+    return _core.hull_triangles(positions, triangles, tolerance).astype(np.bool_)
 
 
 def proxy_from_attributes(description: Mapping[str, Any]) -> _core.Proxy:

@@ -35,8 +35,8 @@ OWNERS = {
     "tiny_obj_loader": ("scene",),
 }
 
-# What each part of the Python package may import from other parts, in the order in which they build on each other; the
-# flat modules are the toolbox, which all may use.
+# The parts of the Python package, in the order in which they build on each other; the flat modules are the
+# toolbox, which all may use.
 PYTHON_FLOORS = ("scene", "pem", "bake", "evaluate", "study", "viewer", "commands")
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
@@ -108,7 +108,7 @@ def test_link_lines_follow_the_direction_of_dependencies() -> None:
 
 
 def python_imports() -> Iterator[tuple[Path, str]]:
-    """File and imported module, of every import of the package from itself, those for annotations included."""
+    """File and module of every import of the package from itself, those for annotations included."""
     package = ROOT / "python" / "mirrorbake"
     for path in sorted(package.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 
 #ifdef MIRRORBAKE_THREAD_SANITIZER
@@ -56,9 +57,7 @@ struct ThreadLimit::State {
 };
 
 ThreadLimit::ThreadLimit(int threads) {
-  if (threads < 0 || threads > 1024) {
-    throw InvalidArgument("threads", std::to_string(threads), "0 (all cores) to 1024");
-  }
+  check_range("threads", threads, 0, 1024, " (0: all cores)");
   if (threads > 0) state_ = std::make_unique<State>(static_cast<std::size_t>(threads));
 }
 ThreadLimit::~ThreadLimit() = default;

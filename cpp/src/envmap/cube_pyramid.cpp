@@ -4,6 +4,7 @@
 #include <bit>
 #include <string>
 
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/projection/cube.hpp"
@@ -23,7 +24,7 @@ std::vector<double> solid_angles(int size) {
 }  // namespace
 
 CubePyramidLayout CubePyramidLayout::full(int size) {
-  if (size < 1 || size > 16384) throw InvalidArgument("size", std::to_string(size), "1 to 16384 texels");
+  check_range("size", size, 1, 16384, " texels");
   return {size, static_cast<int>(std::bit_width(static_cast<unsigned>(size)))};
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 
@@ -33,20 +34,15 @@ int full_level_count(int width, int height) {
 void validate(const EnvMapLayout& layout) {
   validate(layout.projection);
   for (const auto& [name, side] : {std::pair{"width", layout.width}, {"height", layout.height}}) {
-    if (side < 1 || side > 65536) throw InvalidArgument(name, std::to_string(side), "1 to 65536 texels");
+    check_range(name, side, 1, 65536, " texels");
   }
   if (layout.projection.kind == ProjectionKind::cube && layout.width != layout.height) {
     throw InvalidArgument(
         "height", std::to_string(layout.height),
         "the width, " + std::to_string(layout.width) + ": the faces of a cube map are square");
   }
-  if (layout.channels < 1 || layout.channels > 1024) {
-    throw InvalidArgument("channels", std::to_string(layout.channels), "1 to 1024");
-  }
-  const int most = full_level_count(layout.width, layout.height);
-  if (layout.levels < 1 || layout.levels > most) {
-    throw InvalidArgument("levels", std::to_string(layout.levels), "1 to " + std::to_string(most));
-  }
+  check_range("channels", layout.channels, 1, 1024);
+  check_range("levels", layout.levels, 1, full_level_count(layout.width, layout.height));
 }
 
 void validate(const EnvMapView& map) {
@@ -66,9 +62,7 @@ EnvMap make_envmap(const EnvMapLayout& layout, std::span<const std::string> chan
 
 std::vector<double> integrate(const EnvMapView& map, int level) {
   validate(map);
-  if (level < 0 || level >= map.layout.levels) {
-    throw InvalidArgument("level", std::to_string(level), "0 to " + std::to_string(map.layout.levels - 1));
-  }
+  check_range("level", level, 0, map.layout.levels - 1);
   const int width = map.layout.level_width(level);
   const int height = map.layout.level_height(level);
   // A table of a wide panorama would take more memory than its values.

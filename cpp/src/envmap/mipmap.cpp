@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/envmap/texel_lookup.hpp"
@@ -153,9 +154,7 @@ EnvMap build_mips(const EnvMapView& map, MipFilter filter) {
 
 SeamReport measure_seam(const EnvMapView& map, int level) {
   validate(map);
-  if (level < 0 || level >= map.layout.levels) {
-    throw InvalidArgument("level", std::to_string(level), "0 to " + std::to_string(map.layout.levels - 1));
-  }
+  check_range("level", level, 0, map.layout.levels - 1);
   const EnvMapLayout& layout = map.layout;
   const int width = layout.level_width(level);
   const int height = layout.level_height(level);
@@ -188,9 +187,7 @@ SeamReport measure_seam(const EnvMapView& map, int level) {
 std::vector<float> add_border(const EnvMapView& map, int level, int border) {
   validate(map);
   const EnvMapLayout& layout = map.layout;
-  if (level < 0 || level >= layout.levels) {
-    throw InvalidArgument("level", std::to_string(level), "0 to " + std::to_string(layout.levels - 1));
-  }
+  check_range("level", level, 0, layout.levels - 1);
   const int width = layout.level_width(level);
   const int height = layout.level_height(level);
   if (border < 0 || border > std::min(width, height)) {

@@ -11,11 +11,11 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
-#include "resample/line_lookup.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "mirrorbake/envmap/texel_lookup.hpp"
+#include "resample/line_lookup.hpp"
 
 namespace mirrorbake {
 namespace {

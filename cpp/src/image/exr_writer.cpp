@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "exr_file.hpp"
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/image/half.hpp"
@@ -82,7 +83,7 @@ std::uint64_t write_exr(const std::string& path, const std::string& file, int wi
 namespace mirrorbake {
 
 void set_exr_threads(int threads) {
-  if (threads < 0 || threads > 1024) throw InvalidArgument("threads", std::to_string(threads), "0 to 1024");
+  check_range("threads", threads, 0, 1024);
   Imf::setGlobalThreadCount(threads);
 }
 

@@ -7,7 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include "finite_direction.hpp"
-#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/check.hpp"
 
 namespace mirrorbake {
 
@@ -32,15 +32,8 @@ MapJacobian dual_paraboloid_jacobian(int face, double x, double y) {
 }
 
 glm::mat4 dual_paraboloid_texture_matrix(const glm::mat3& frame_from_map, int face) {
-  if (face != 0 && face != 1) throw InvalidArgument("face", std::to_string(face), "0 (front) or 1 (back)");
-  const glm::mat3 product = frame_from_map * glm::transpose(frame_from_map);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      if (!(std::abs(product[i][j] - (i == j ? 1.0F : 0.0F)) <= 1e-4F)) {
-        throw InvalidArgument("frame_from_map", "not orthonormal", "a rotation or reflection");
-      }
-    }
-  }
+  check_range("face", face, 0, 1);
+  check_orthonormal("frame_from_map", frame_from_map);
   // s = ½ + ½ r_x/q and t = ½ − ½ r_y/q with q = 1 ± r_z, in the order A · P · S · M⁻¹ of [EMT]; GLM's matrices
   // are lists of columns.
   const float sign = face == 0 ? 1.0F : -1.0F;

@@ -10,6 +10,7 @@
 #include <glm/trigonometric.hpp>
 
 #include "finite_direction.hpp"
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
@@ -190,7 +191,7 @@ double texel_solid_angle(const Projection& p, int width, int height, int column,
 std::vector<double> texel_solid_angles(const Projection& p, int width, int height) {
   validate(p);
   for (int size : {width, height}) {
-    if (size < 1 || size > 65536) throw InvalidArgument("size", std::to_string(size), "1 to 65536 texels");
+    check_range("size", size, 1, 65536, " texels");
   }
   std::vector<double> angles(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   parallel_for(static_cast<std::size_t>(height), 8, [&](std::size_t begin, std::size_t end) {

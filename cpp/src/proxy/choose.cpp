@@ -13,7 +13,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "is_finite.hpp"
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
@@ -325,23 +325,19 @@ void check(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOptions& o
   }
   constexpr std::size_t kMinRays = 16;
   if (n < kMinRays) throw InvalidArgument("rays", std::to_string(n), "at least 16");
-  if (!detail::is_finite(origin)) throw InvalidArgument("origin", text_of(origin), "finite coordinates");
+  check_finite("origin", origin);
+  check_finite("positions", rays.positions);
   for (std::size_t i = 0; i < n; ++i) {
     const std::string index = "[" + std::to_string(i) + "]";
-    if (!detail::is_finite(rays.positions[i])) {
-      throw InvalidArgument("positions" + index, text_of(rays.positions[i]), "finite coordinates");
-    }
-    if (!detail::is_finite(rays.directions[i]) || rays.directions[i] == glm::vec3(0.0F)) {
+    if (!is_finite(rays.directions[i]) || rays.directions[i] == glm::vec3(0.0F)) {
       throw InvalidArgument("directions" + index, text_of(rays.directions[i]), "a length > 0");
     }
     if (!(rays.distances[i] > 0)) {
       throw InvalidArgument("distances" + index, std::to_string(rays.distances[i]), "a distance > 0");
     }
   }
-  if (!(options.tolerance >= 0)) throw InvalidArgument("tolerance", text_of(options.tolerance), "≥ 0");
-  if (!(options.negligible_angle >= 0)) {
-    throw InvalidArgument("negligible_angle", text_of(options.negligible_angle), "≥ 0");
-  }
+  check_at_least("tolerance", options.tolerance, 0.0);
+  check_at_least("negligible_angle", options.negligible_angle, 0.0);
   if (options.max_rays_per_view < kMinRays) {
     throw InvalidArgument("max_rays_per_view", std::to_string(options.max_rays_per_view), "at least 16");
   }
@@ -374,18 +370,22 @@ std::string explain(const ProxyChoice& choice, std::size_t best, const ProxyChoi
   return text + (simpler.empty() ? "." : "; simpler ones are worse: " + simpler + ".");
 }
 
-}  // namespace
+/// What the shapes are fitted to: an even selection of each view's rays, in folds of which each is predicted from the
+/// others.
+struct Selection {
+  Problem rays;
+  std::vector<std::size_t> fold;  ///< of each ray
+  std::size_t folds = 0;
+  std::vector<glm::vec3> hits;  ///< of the rays that meet something
+};
 
-ProxyChoice choose_proxy(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOptions& options) {
-  check(rays, origin, options);
-
-  // An even selection of each view's rays; a single view becomes two by alternating.
+// A fold is a view; a single view becomes two folds by alternating.
+Selection select(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOptions& options) {
   std::map<int, std::vector<std::size_t>> rays_of_view;
   for (std::size_t i = 0; i < rays.views.size(); ++i) rays_of_view[rays.views[i]].push_back(i);
-  Problem all;
-  all.origin = origin;
-  std::vector<std::size_t> fold_of_ray;
-  std::vector<glm::vec3> hits;
+  Selection chosen;
+  chosen.rays.origin = origin;
+  chosen.folds = std::max<std::size_t>(rays_of_view.size(), 2);
   std::vector<double> hit_distances;
   std::size_t view_number = 0;
   for (const auto& [view, indices] : rays_of_view) {
@@ -401,65 +401,84 @@ ProxyChoice choose_proxy(const TracedRays& rays, glm::vec3 origin, const ProxyCh
         const double distance = glm::length(seen);
         if (!(distance > 0)) continue;  // nothing can be said of a hit at the origin
         target = seen / distance;
-        hits.emplace_back(hit);
+        chosen.hits.emplace_back(hit);
         hit_distances.push_back(distance);
       }
-      all.positions.push_back(p);
-      all.directions.push_back(d);
-      all.targets.push_back(target);
-      fold_of_ray.push_back(rays_of_view.size() > 1 ? view_number : j % 2);
+      chosen.rays.positions.push_back(p);
+      chosen.rays.directions.push_back(d);
+      chosen.rays.targets.push_back(target);
+      chosen.fold.push_back(rays_of_view.size() > 1 ? view_number : j % 2);
     }
     ++view_number;
   }
-  const std::size_t folds = rays_of_view.size() > 1 ? rays_of_view.size() : 2;
   if (!hit_distances.empty()) {
     const auto middle = hit_distances.begin() + static_cast<std::ptrdiff_t>(hit_distances.size() / 2);
     std::nth_element(hit_distances.begin(), middle, hit_distances.end());
-    all.scale = *middle;
+    chosen.rays.scale = *middle;
   }
+  return chosen;
+}
 
-  ProxyChoice choice;
-  // A few steps show which start leads where; the best one is followed to the end.
+constexpr int kMaxSteps = 60;
+
+// A few steps from each start show which leads where; the best one is followed to the end. The cost is infinite if no
+// start has the origin inside.
+Fit best_fit(const Family& family, const Selection& selection) {
   constexpr int kFirstSteps = 10;
-  constexpr int kMaxSteps = 60;
-  for (const Family& family : kFamilies) {
-    if (family.shape != Shape::infinite && hits.empty()) continue;
-    Fit best;
-    const std::vector<Parameters> candidates = starts(family, all, hits);
-    std::vector<Fit> fits(candidates.size());
-    parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) fits[i] = fit_shape(family, all, candidates[i], kFirstSteps);
-    });
-    for (const Fit& fit : fits) {
-      if (fit.cost < best.cost) best = fit;
+  const std::vector<Parameters> candidates = starts(family, selection.rays, selection.hits);
+  std::vector<Fit> fits(candidates.size());
+  parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      fits[i] = fit_shape(family, selection.rays, candidates[i], kFirstSteps);
     }
-    if (!std::isfinite(best.cost)) continue;  // no start has the origin inside
-    best = fit_shape(family, all, best.parameters, kMaxSteps);
+  });
+  Fit best;
+  for (const Fit& fit : fits) {
+    if (fit.cost < best.cost) best = fit;
+  }
+  return std::isfinite(best.cost) ? fit_shape(family, selection.rays, best.parameters, kMaxSteps) : best;
+}
 
-    // Each fold starts from the fit to everything: what is left to predict is the shape, not which local minimum the
-    // search finds.
-    std::vector<double> sums(folds, 0.0);
-    parallel_for(folds, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t fold = begin; fold < end; ++fold) {
-        Problem seen, unseen;
-        seen.origin = unseen.origin = all.origin;
-        seen.scale = unseen.scale = all.scale;
-        for (std::size_t i = 0; i < fold_of_ray.size(); ++i)
-          (fold_of_ray[i] == fold ? unseen : seen).add(all, i);
-        if (unseen.positions.empty() || seen.positions.empty()) continue;
-        const Fit fit = fit_shape(family, seen, best.parameters, kMaxSteps);
-        sums[fold] = mean_angle(unseen, make_proxy(family, fit.parameters, origin, all.scale)) *
-                     static_cast<double>(unseen.positions.size());
+// Mean angle by which a fit to the other folds misses. Each starts from the fit to everything: what is left to predict
+// is the shape, not which local minimum the search finds.
+double off_view_error(const Family& family, const Selection& selection, const Parameters& start) {
+  const Problem& all = selection.rays;
+  std::vector<double> sums(selection.folds, 0.0);
+  parallel_for(selection.folds, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t fold = begin; fold < end; ++fold) {
+      Problem seen, unseen;
+      seen.origin = unseen.origin = all.origin;
+      seen.scale = unseen.scale = all.scale;
+      for (std::size_t i = 0; i < selection.fold.size(); ++i) {
+        (selection.fold[i] == fold ? unseen : seen).add(all, i);
       }
-    });
-    double sum = 0;
-    for (double fold_sum : sums) sum += fold_sum;
+      if (unseen.positions.empty() || seen.positions.empty()) continue;
+      const Fit fit = fit_shape(family, seen, start, kMaxSteps);
+      sums[fold] = mean_angle(unseen, make_proxy(family, fit.parameters, all.origin, all.scale)) *
+                   static_cast<double>(unseen.positions.size());
+    }
+  });
+  double sum = 0;
+  for (double fold_sum : sums) sum += fold_sum;
+  return sum / static_cast<double>(all.positions.size());
+}
+
+}  // namespace
+
+ProxyChoice choose_proxy(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOptions& options) {
+  check(rays, origin, options);
+  const Selection selection = select(rays, origin, options);
+  ProxyChoice choice;
+  for (const Family& family : kFamilies) {
+    if (family.shape != Shape::infinite && selection.hits.empty()) continue;
+    const Fit best = best_fit(family, selection);
+    if (!std::isfinite(best.cost)) continue;
     ProxyCandidate candidate;
     candidate.name = family.name;
     candidate.parameters = family.parameters;
-    candidate.proxy = make_proxy(family, best.parameters, origin, all.scale);
-    candidate.fit_error = mean_angle(all, candidate.proxy);
-    candidate.off_view_error = sum / static_cast<double>(all.positions.size());
+    candidate.proxy = make_proxy(family, best.parameters, origin, selection.rays.scale);
+    candidate.fit_error = mean_angle(selection.rays, candidate.proxy);
+    candidate.off_view_error = off_view_error(family, selection, best.parameters);
     choice.candidates.push_back(std::move(candidate));
   }
 

@@ -9,7 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "is_finite.hpp"
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 
@@ -18,16 +18,7 @@ namespace {
 
 void check_points(const char* name, std::span<const glm::vec3> points) {
   if (points.empty()) throw InvalidArgument(name, "empty", "at least one point");
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!detail::is_finite(points[i])) {
-      throw InvalidArgument(std::string(name) + "[" + std::to_string(i) + "]", text_of(points[i]),
-                            "finite coordinates");
-    }
-  }
-}
-
-void check_point(const char* name, glm::vec3 point) {
-  if (!detail::is_finite(point)) throw InvalidArgument(name, text_of(point), "finite coordinates");
+  check_finite(name, points);
 }
 
 float round_up(double value) {
@@ -129,7 +120,7 @@ double side_distance(const glm::dvec3& d, int side) { return (side % 2 == 1 ? 1.
 /// Hits relative to the origin, without those at the origin itself.
 std::vector<glm::dvec3> hits_from(std::span<const glm::vec3> hits, glm::vec3 origin) {
   check_points("hits", hits);
-  check_point("origin", origin);
+  check_finite("origin", origin);
   std::vector<glm::dvec3> relative;
   relative.reserve(hits.size());
   for (const glm::vec3& hit : hits) {
@@ -248,16 +239,13 @@ double quantile(std::vector<double>& values, double q) {
 glm::vec3 area_weighted_centroid(std::span<const glm::vec3> positions,
                                  std::span<const glm::uvec3> triangles) {
   check_points("positions", positions);
+  check_triangles(triangles, positions.size());
   // Relative to a vertex: far from the world's origin the products would lose digits.
   const glm::dvec3 reference(positions[0]);
   glm::dvec3 sum(0.0);
   double area = 0;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     const glm::uvec3 t = triangles[i];
-    if (std::max({t.x, t.y, t.z}) >= positions.size()) {
-      throw InvalidArgument("triangles[" + std::to_string(i) + "]", std::to_string(std::max({t.x, t.y, t.z})),
-                            "indices below " + std::to_string(positions.size()));
-    }
     const glm::dvec3 a = glm::dvec3(positions[t.x]) - reference;
     const glm::dvec3 b = glm::dvec3(positions[t.y]) - reference;
     const glm::dvec3 c = glm::dvec3(positions[t.z]) - reference;
@@ -271,7 +259,7 @@ glm::vec3 area_weighted_centroid(std::span<const glm::vec3> positions,
 
 Ellipsoid fit_ellipsoid(std::span<const glm::vec3> points, glm::vec3 centre) {
   check_points("points", points);
-  check_point("centre", centre);
+  check_finite("centre", centre);
   const glm::dvec3 c(centre);
   glm::dvec3 extent(0.0);
   for (const glm::vec3& point : points) extent = glm::max(extent, glm::abs(glm::dvec3(point) - c));

@@ -6,9 +6,9 @@
 
 #include <glm/geometric.hpp>
 
-#include "is_finite.hpp"
 #include "lookup_formulas.hpp"
 #include "lookup_kernels.hpp"
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -91,7 +91,7 @@ Vector lookup_one(const Proxy& proxy, const Vector& position, const Vector& dire
 /// Throws for the first NaN or infinite value in the row, if there is one.
 template <typename Vector>
 void check_row(std::string_view name, std::span<const Vector> vectors, std::size_t row) {
-  if (detail::is_finite(vectors[row])) return;
+  if (is_finite(vectors[row])) return;
   throw InvalidArgument(name, text_of(vectors[row]) + " in row " + std::to_string(row), "finite");
 }
 
@@ -160,7 +160,7 @@ void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions
 void mirror_lookups(std::span<const Proxy> proxies, glm::vec3 eye, std::span<const glm::vec3> positions,
                     std::span<const glm::vec3> normals, std::span<glm::vec3> lookups) {
   if (proxies.empty()) throw InvalidArgument("proxies", "empty", "at least one");
-  if (!detail::is_finite(eye)) throw InvalidArgument("eye", text_of(eye), "finite");
+  check_finite("eye", eye);
   std::vector<LookupConstants> k;
   for (const Proxy& proxy : proxies) k.push_back(constants(proxy));
   double e[3];

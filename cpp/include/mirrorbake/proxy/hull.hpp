@@ -18,13 +18,9 @@ inline constexpr double kHullTolerance = 1e-4;
 /// can then be seen from it, at whatever angle, and it needs the distant layer only. Triangles face counter-clockwise;
 /// those without area are not on the hull.
 ///
-/// `extremes` are points that include the vertices of the convex hull, if the caller knows them (all `positions` if
-/// empty): the cost is at most one comparison per triangle and extreme.
-///
 /// Throws InvalidArgument for indices out of range, coordinates that are not finite, and a negative tolerance.
 std::vector<std::uint8_t> hull_triangles(std::span<const glm::vec3> positions,
                                          std::span<const glm::uvec3> triangles,
-                                         std::span<const glm::vec3> extremes = {},
                                          double tolerance = kHullTolerance);
 
 }  // namespace mirrorbake

@@ -12,6 +12,7 @@
 
 #include <glm/matrix.hpp>
 
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -39,17 +40,6 @@ const ResampleKernels& resample_kernels() {
 }
 
 namespace {
-
-void check_orthonormal(const glm::mat3& m) {
-  const glm::mat3 product = m * glm::transpose(m);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      if (!(std::abs(product[i][j] - (i == j ? 1.0F : 0.0F)) <= 1e-4F)) {
-        throw InvalidArgument("source_from_target", "not orthonormal", "a rotation or reflection");
-      }
-    }
-  }
-}
 
 // Texels are counted in 32 bits.
 void check_texels(const char* name, const EnvMapLayout& layout) {
@@ -366,7 +356,7 @@ Resampler::Resampler(const EnvMapLayout& source, const Projection& target, int w
   validate(result);
   check_texels("source", source);
   check_texels("target", result);
-  check_orthonormal(options.source_from_target);
+  check_orthonormal("source_from_target", options.source_from_target);
   plan_ = std::make_unique<Plan>(source, result, options);
   if (max_bytes > 0) plan_->keep_taps(max_bytes);
 }
@@ -400,9 +390,7 @@ void Resampler::apply(const EnvMapView& source, std::span<float> result) const {
     throw InvalidArgument("source", text(source.layout), text(expected));
   }
   const std::size_t size = layout(source.layout.channels).size();
-  if (result.size() != size) {
-    throw InvalidArgument("result", std::to_string(result.size()) + " values", std::to_string(size));
-  }
+  check_length("result", result.size(), size, "texels × channels");
   plan_->apply(source.level(0), source.layout.channels, result);
 }
 

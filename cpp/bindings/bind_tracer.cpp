@@ -26,54 +26,6 @@ std::span<const glm::vec3> points(const PointArray& array) {
   return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
 }
 
-// Read-only views that keep the owner alive.
-template <auto member>
-void def_vectors(nb::class_<SurfaceSamples>& c, const char* name, const char* doc) {
-  c.def_prop_ro(
-      name, [](nb::handle self) { return vectors_view(nb::cast<const SurfaceSamples&>(self).*member, self); },
-      doc);
-}
-template <auto member>
-void def_scalars(nb::class_<SurfaceSamples>& c, const char* name, const char* doc) {
-  c.def_prop_ro(
-      name, [](nb::handle self) { return scalars_view(nb::cast<const SurfaceSamples&>(self).*member, self); },
-      doc);
-}
-
-void bind_samples(nb::module_& m) {
-  nb::class_<SurfaceSamples> c(m, "SurfaceSamples",
-                               "Where the samples of an image's pixels first meet the reflector: one entry "
-                               "per sample that sees it, ordered by\n"
-                               "pixel, then by sample. All arrays are read-only views; the last four are "
-                               "empty when no light was traced.");
-  c.def_ro("width", &SurfaceSamples::width, "Of the image, pixels.");
-  c.def_ro("height", &SurfaceSamples::height, "Of the image, pixels.");
-  c.def_ro("samples_per_pixel", &SurfaceSamples::samples_per_pixel);
-  c.def("__len__", &SurfaceSamples::size);
-  using S = SurfaceSamples;
-  def_scalars<&S::pixel>(c, "pixel", "(n,) uint32: y * width + x.");
-  def_scalars<&S::part>(c, "part", "(n,) uint16: part of the reflector.");
-  def_scalars<&S::triangle>(c, "triangle", "(n,) uint32: triangle of the reflector's mesh.");
-  def_vectors<&S::barycentric>(c, "barycentric",
-                               "(n, 2): weights of the triangle's second and third vertex.");
-  def_vectors<&S::position>(c, "position", "(n, 3): world space, metres.");
-  def_vectors<&S::normal>(c, "normal", "(n, 3): unit shading normal, towards the eye.");
-  def_vectors<&S::reflection>(c, "reflection", "(n, 3): unit direction r = 2(n·v)n - v.");
-  def_vectors<&S::dposition_dx>(c, "dposition_dx", "(n, 3): change of `position` per pixel to the right.");
-  def_vectors<&S::dposition_dy>(c, "dposition_dy", "(n, 3): change of `position` per pixel down.");
-  def_vectors<&S::dreflection_dx>(c, "dreflection_dx",
-                                  "(n, 3): change of `reflection` per pixel to the right.");
-  def_vectors<&S::dreflection_dy>(c, "dreflection_dy", "(n, 3): change of `reflection` per pixel down.");
-  def_vectors<&S::fresnel>(c, "fresnel", "(n, 3): Fresnel reflectance F of the first bounce.");
-  def_vectors<&S::albedo>(c, "albedo", "(n, 3): diffuse albedo, times (1 - F) under a coat.");
-  def_vectors<&S::diffuse>(c, "diffuse", "(n, 3): radiance D that the body reflects and emits.");
-  def_vectors<&S::local>(c, "local",
-                         "(n, 4): incident radiance from the reflector itself, premultiplied, and alpha.");
-  def_vectors<&S::distant>(c, "distant", "(n, 3): incident radiance through the reflector.");
-  def_scalars<&S::hit_distance>(
-      c, "hit_distance", "(n,): metres along `reflection` to what the distant ray hits; inf: nothing.");
-}
-
 }  // namespace
 
 void bind_tracer(nb::module_& m) {
@@ -176,8 +128,6 @@ void bind_tracer(nb::module_& m) {
       .def_ro("share_above", &BeautyTrace::share_above,
               "Share of the tiles that samples_per_pixel ended before they reached the limit.");
 
-  bind_samples(m);
-
   nb::class_<LayerTrace>(m, "LayerTrace", "The layers of one reflector in one view.")
       .def_prop_ro(
           "layers",
@@ -253,12 +203,22 @@ void bind_tracer(nb::module_& m) {
                   "options: TraceOptions = ...) -> list[LayerTrace]"),
           "Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as "
           "trace_layers gives.")
-      .def("trace_visibility", &Tracer::trace_visibility, nb::arg("camera"), nb::arg("reflector"),
-           nb::arg("options") = TraceOptions{}, nb::call_guard<nb::gil_scoped_release>(),
-           nb::sig(
-               "def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> "
-               "SurfaceSamples"),
-           "Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.")
+      .def(
+          "trace_visibility",
+          [](const Tracer& tracer, const Camera& camera, int reflector, const TraceOptions& options,
+             const std::vector<glm::vec2>& places) {
+            const nb::gil_scoped_release released;
+            return tracer.trace_visibility(camera, reflector, options, places);
+          },
+          nb::arg("camera"), nb::arg("reflector"), nb::arg("options") = TraceOptions{},
+          nb::arg("places") = std::vector<glm::vec2>{},
+          nb::sig("def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ..., "
+                  "places: "
+                  "collections.abc.Sequence[collections.abc.Sequence[float]] = ()) -> SurfaceSamples"),
+          "Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.\n"
+          "With `places` (x, y in [0, 1) from the pixel's top left corner) the rays go through those places "
+          "of "
+          "every\npixel instead, as a renderer's lookups do (RunTimeModel.places).")
       .def(
           "capture",
           [](const Tracer& tracer, glm::vec3 origin, const std::string& projection, int width, int height,

@@ -9,6 +9,7 @@ void bind_envmap(nb::module_& m);
 void bind_image(nb::module_& m);
 void bind_material(nb::module_& m);
 void bind_scene(nb::module_& m);
+void bind_surface(nb::module_& m);
 void bind_tracer(nb::module_& m);
 void bind_projection(nb::module_& m);
 void bind_inference(nb::module_& m);
@@ -25,6 +26,7 @@ NB_MODULE(_core, m) {
   bind_image(m);
   bind_material(m);
   bind_scene(m);
+  bind_surface(m);
   bind_tracer(m);
   bind_projection(m);
   bind_envmap(m);

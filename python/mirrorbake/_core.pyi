@@ -827,6 +827,153 @@ def make_room() -> Scene:
     which is not part of it, stands there.
     """
 
+class ShellLight:
+    """
+    Light that the reflected rays of SurfaceSamples bring from one shell of the environment.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def radiance(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """
+        (n, 4): incident radiance, premultiplied, and alpha, which is 1 in the last shell.
+        """
+
+    @property
+    def hit_distance(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n,): metres along the ray to what it meets; inf: nothing."""
+
+class SurfaceSamples:
+    """
+    Where the samples of an image's pixels first meet the reflector: one entry per sample that sees it, ordered by
+    pixel, then by sample. All arrays are read-only views; `diffuse` and `shells` are empty when no light was traced.
+    """
+
+    @property
+    def width(self) -> int:
+        """Of the image, pixels."""
+
+    @property
+    def height(self) -> int:
+        """Of the image, pixels."""
+
+    @property
+    def samples_per_pixel(self) -> int: ...
+
+    def __len__(self) -> int: ...
+
+    @property
+    def pixel(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
+        """(n,) uint32: y * width + x."""
+
+    @property
+    def part(self) -> Annotated[NDArray[numpy.uint16], dict(writable=False)]:
+        """(n,) uint16: part of the reflector."""
+
+    @property
+    def triangle(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
+        """(n,) uint32: triangle of the reflector's mesh."""
+
+    @property
+    def barycentric(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 2): weights of the triangle's second and third vertex."""
+
+    @property
+    def position(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): world space, metres."""
+
+    @property
+    def normal(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): unit shading normal, towards the eye."""
+
+    @property
+    def reflection(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): unit direction r = 2(n·v)n - v."""
+
+    @property
+    def dposition_dx(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): change of `position` per pixel to the right."""
+
+    @property
+    def dposition_dy(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): change of `position` per pixel down."""
+
+    @property
+    def dreflection_dx(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): change of `reflection` per pixel to the right."""
+
+    @property
+    def dreflection_dy(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): change of `reflection` per pixel down."""
+
+    @property
+    def fresnel(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): Fresnel reflectance F of the first bounce."""
+
+    @property
+    def albedo(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): diffuse albedo, times (1 - F) under a coat."""
+
+    @property
+    def diffuse(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): radiance D that the body reflects and emits."""
+
+    @property
+    def shells(self) -> list[ShellLight]:
+        """Front to back: the incident radiance is L0 + (1 - a0)(L1 + ...)."""
+
+class RunTimeModel:
+    """
+    How the renderer that will draw the maps reads them: what a map is inferred for.
+    """
+
+    def __init__(self, *, name: str, places: Sequence[Sequence[float]], footprint_scale: float, filter: str = 'anisotropic', max_taps: int = 4, coordinates: str = 'per_pixel', fresnel: str = 'exact', texel_bits: int = 16) -> None: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def places(self) -> list[Sequence[float]]:
+        """
+        Where in a pixel the lookups lie: (x, y) in [0, 1) from its top left corner.
+        """
+
+    @property
+    def footprint_scale(self) -> float:
+        """Size of a lookup's footprint in pixels, in (0, 1024]."""
+
+    @property
+    def filter(self) -> str:
+        """nearest, bilinear, trilinear or anisotropic."""
+
+    @property
+    def max_taps(self) -> int:
+        """Of `anisotropic`, 1 to 16."""
+
+    @property
+    def coordinates(self) -> str:
+        """per_pixel or per_vertex."""
+
+    @property
+    def fresnel(self) -> str:
+        """exact, table or schlick."""
+
+    @property
+    def texel_bits(self) -> int:
+        """
+        Of a channel in the texture format: 32, 16 (half) or 9 (shared exponent, RGB9E5).
+        """
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+def run_time_model(name: str) -> RunTimeModel:
+    """
+    Web (four lookups per pixel on a rotated grid, footprint 1/2, up to 4 taps), Web1 (one lookup) or
+    Reference (16 lookups, footprint 1/4).
+    """
+
 class Camera:
     """A pinhole camera. Pixel (0,0) is the top left one."""
 
@@ -984,97 +1131,6 @@ class BeautyTrace:
         Share of the tiles that samples_per_pixel ended before they reached the limit.
         """
 
-class SurfaceSamples:
-    """
-    Where the samples of an image's pixels first meet the reflector: one entry per sample that sees it, ordered by
-    pixel, then by sample. All arrays are read-only views; the last four are empty when no light was traced.
-    """
-
-    @property
-    def width(self) -> int:
-        """Of the image, pixels."""
-
-    @property
-    def height(self) -> int:
-        """Of the image, pixels."""
-
-    @property
-    def samples_per_pixel(self) -> int: ...
-
-    def __len__(self) -> int: ...
-
-    @property
-    def pixel(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
-        """(n,) uint32: y * width + x."""
-
-    @property
-    def part(self) -> Annotated[NDArray[numpy.uint16], dict(writable=False)]:
-        """(n,) uint16: part of the reflector."""
-
-    @property
-    def triangle(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
-        """(n,) uint32: triangle of the reflector's mesh."""
-
-    @property
-    def barycentric(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 2): weights of the triangle's second and third vertex."""
-
-    @property
-    def position(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): world space, metres."""
-
-    @property
-    def normal(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): unit shading normal, towards the eye."""
-
-    @property
-    def reflection(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): unit direction r = 2(n·v)n - v."""
-
-    @property
-    def dposition_dx(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): change of `position` per pixel to the right."""
-
-    @property
-    def dposition_dy(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): change of `position` per pixel down."""
-
-    @property
-    def dreflection_dx(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): change of `reflection` per pixel to the right."""
-
-    @property
-    def dreflection_dy(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): change of `reflection` per pixel down."""
-
-    @property
-    def fresnel(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): Fresnel reflectance F of the first bounce."""
-
-    @property
-    def albedo(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): diffuse albedo, times (1 - F) under a coat."""
-
-    @property
-    def diffuse(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): radiance D that the body reflects and emits."""
-
-    @property
-    def local(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """
-        (n, 4): incident radiance from the reflector itself, premultiplied, and alpha.
-        """
-
-    @property
-    def distant(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): incident radiance through the reflector."""
-
-    @property
-    def hit_distance(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """
-        (n,): metres along `reflection` to what the distant ray hits; inf: nothing.
-        """
-
 class LayerTrace:
     """The layers of one reflector in one view."""
 
@@ -1128,9 +1184,11 @@ class Tracer:
         Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as trace_layers gives.
         """
 
-    def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> SurfaceSamples:
+    def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ..., places: Sequence[Sequence[float]] = ()) -> SurfaceSamples:
         """
         Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.
+        With `places` (x, y in [0, 1) from the pixel's top left corner) the rays go through those places of every
+        pixel instead, as a renderer's lookups do (RunTimeModel.places).
         """
 
     def capture(self, origin: Sequence[float], projection: str, width: int, height: int, hidden: Sequence[int] = ..., options: TraceOptions = ...) -> NDArray[numpy.float32]:

@@ -106,7 +106,7 @@ def test_renderer_draws_what_the_matrix_says(trace: mb.LayerTrace, matrix: mb.Re
 def test_inferred_map_reproduces_the_traced_reflection(
     trace: mb.LayerTrace, matrix: mb.RenderingMatrix
 ) -> None:
-    target = matrix.average(trace.samples, 0, np.asarray(trace.samples.distant))
+    target = matrix.average(trace.samples, 0, np.asarray(trace.samples.shells[1].radiance)[:, :3])
     weights = mb.display_row_weights(matrix, SAMPLES, target)
     assert weights.shape == (matrix.rows,)
     texels, report = mb.MapSolver(matrix, weights, LAYOUT).solve(target)

@@ -20,9 +20,11 @@ ALLOWED["image"] = {"core"}
 ALLOWED["shading"] = {"core"}
 ALLOWED["envmap"] = {"core", "projection", "proxy", "image"}
 ALLOWED["prefilter"] = ALLOWED["envmap"] | {"envmap"}
+ALLOWED["surface"] = ALLOWED["envmap"] | {"envmap"}
 ALLOWED["scene"] = {"core", "image", "shading"}
-ALLOWED["tracer"] = ALLOWED["scene"] | {"scene", "projection"}  # captures the world into a projection
-ALLOWED["inference"] = set(ALLOWED)
+# captures the world into a projection, records where the reflector is seen
+ALLOWED["tracer"] = ALLOWED["scene"] | {"scene", "projection", "surface"}
+ALLOWED["inference"] = ALLOWED["surface"] | {"surface"}  # never the tracer
 ALLOWED["pem"] = set(ALLOWED)
 
 # Each library is the business of the modules named here, and of their implementation only.

@@ -78,7 +78,8 @@ def test_layers_and_samples_recompose_the_beauty(tracer: Tracer) -> None:
     assert len(s) == len(s.pixel) > 500
     coverage = np.bincount(s.pixel, minlength=16 * 24).reshape(16, 24) / 8
     np.testing.assert_array_equal(trace.layers[..., trace.channels.index("coverage")], coverage)
-    sum_of_layers = s.diffuse + s.fresnel * (s.local[:, :3] + (1 - s.local[:, 3:]) * s.distant)
+    local, distant = (np.asarray(shell.radiance) for shell in s.shells)
+    sum_of_layers = s.diffuse + s.fresnel * (local[:, :3] + (1 - local[:, 3:]) * distant[:, :3])
     # The same terms added in another order.
     np.testing.assert_allclose(sum_of_layers, trace.sample_beauty, rtol=1e-5, atol=1e-6)
 
@@ -138,13 +139,17 @@ def test_samples_are_read_only_views_that_outlive_their_trace(tracer: Tracer) ->
         "pixel": (n,), "part": (n,), "triangle": (n,), "barycentric": (n, 2), "position": (n, 3),
         "normal": (n, 3), "reflection": (n, 3), "dposition_dx": (n, 3), "dposition_dy": (n, 3),
         "dreflection_dx": (n, 3), "dreflection_dy": (n, 3), "fresnel": (n, 3), "albedo": (n, 3),
-        "diffuse": (n, 3), "local": (n, 4), "distant": (n, 3), "hit_distance": (n,),
+        "diffuse": (n, 3),
     }  # fmt: skip
     for name, shape in shapes.items():
         array = getattr(trace.samples, name)
         assert array.shape == shape, name
         assert not array.flags.writeable, name
         assert array.__array_interface__["data"] == getattr(trace.samples, name).__array_interface__["data"]
+    for shell in trace.samples.shells:
+        assert (shell.radiance.shape, shell.hit_distance.shape) == ((n, 4), (n,)), shell.name
+        assert not shell.radiance.flags.writeable
+    assert [shell.name for shell in trace.samples.shells] == ["local", "distant"]
     position = trace.samples.position
     layers = trace.layers
     kept = position.copy(), layers.copy()
@@ -160,7 +165,20 @@ def test_visibility_has_geometry_and_no_light(tracer: Tracer) -> None:
     traced = tracer.trace_layers(CAMERA, 0, options).samples
     np.testing.assert_array_equal(visible.pixel, traced.pixel)
     np.testing.assert_array_equal(visible.reflection, traced.reflection)
-    assert visible.distant.shape == (0, 3)
+    assert visible.diffuse.shape == (0, 3)
+    assert visible.shells == []
+
+
+def test_visibility_through_given_places_is_that_of_their_rays(tracer: Tracer) -> None:
+    places = [(0.5, 0.5), (0.125, 0.75)]
+    samples = tracer.trace_visibility(CAMERA, 0, places=places)
+    assert samples.samples_per_pixel == 2
+    again = tracer.trace_visibility(CAMERA, 0, TraceOptions(seed=7), places)
+    np.testing.assert_array_equal(samples.position, again.position)  # nothing about them is random
+    centres = tracer.trace_visibility(CAMERA, 0, places=places[:1])
+    assert np.isin(np.asarray(centres.pixel), np.asarray(samples.pixel)).all()
+    with pytest.raises(ValueError, match=r"places\[1\]"):
+        tracer.trace_visibility(CAMERA, 0, places=[(0.5, 0.5), (1.0, 0.5)])
 
 
 def test_capture_hides_objects(tracer: Tracer) -> None:

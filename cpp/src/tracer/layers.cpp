@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -14,6 +15,7 @@
 #include "integrator.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "options.hpp"
 #include "state.hpp"
 
@@ -44,7 +46,7 @@ void for_each_array(const Task& task) {
   };
   call(&S::pixel, &S::part, &S::triangle, &S::barycentric, &S::position, &S::normal, &S::reflection,
        &S::dposition_dx, &S::dposition_dy, &S::dreflection_dx, &S::dreflection_dy, &S::fresnel, &S::albedo,
-       &S::diffuse, &S::local, &S::distant, &S::hit_distance);
+       &S::diffuse);
 }
 
 bool meets(const Hit& hit, int object) { return !hit.missed() && static_cast<int>(hit.geometry) == object; }
@@ -55,6 +57,21 @@ struct Row {
   std::vector<glm::vec3> beauty;
 };
 
+/// Moves the rows' arrays one behind the other; `array` picks one out of a row's samples.
+template <typename Array>
+auto join(std::vector<Row>& rows, const Array& array) {
+  std::size_t size = 0;
+  for (Row& row : rows) size += array(row.samples).size();
+  std::remove_reference_t<decltype(array(rows.front().samples))> whole;
+  whole.reserve(size);
+  for (Row& row : rows) {
+    auto& part = array(row.samples);
+    whole.insert(whole.end(), part.begin(), part.end());
+    part = {};
+  }
+  return whole;
+}
+
 /// The rows one after the other. Empties them.
 SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, const TraceOptions& options) {
   SurfaceSamples all;
@@ -62,14 +79,18 @@ SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, co
   all.height = window.height;
   all.samples_per_pixel = options.samples_per_pixel;
   for_each_array([&](auto member) {
-    auto& whole = all.*member;
-    std::size_t size = 0;
-    for (const Row& row : rows) size += (row.samples.*member).size();
-    whole.reserve(size);
-    for (Row& row : rows) {
-      auto& part = row.samples.*member;
-      whole.insert(whole.end(), part.begin(), part.end());
-      part = {};
+    all.*member = join(
+        rows, [member](SurfaceSamples & samples) -> auto& { return samples.*member; });
+  });
+  all.shells.resize(rows.front().samples.shells.size());
+  parallel_for(all.shells.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      ShellLight& shell = all.shells[k];
+      shell.name = rows.front().samples.shells[k].name;
+      shell.radiance = join(
+          rows, [k](SurfaceSamples & s) -> auto& { return s.shells[k].radiance; });
+      shell.hit_distance = join(
+          rows, [k](SurfaceSamples & s) -> auto& { return s.shells[k].hit_distance; });
     }
   });
   return all;
@@ -96,12 +117,25 @@ void record_surface(SurfaceSamples& out, const World& world, const Surface& s, f
   out.albedo.push_back(s.albedo);
 }
 
-/// The light that arrives along a direction of the specular lobe, split by what the ray hits first.
+/// The light that arrives along a direction of the specular lobe, split by what the ray hits first, with the distance along
+/// the direction to what each layer's ray hits.
 struct SpecularLayers {
   glm::vec4 local{0.0F};
   glm::vec3 distant{0.0F};
-  float hit_distance = std::numeric_limits<float>::infinity();
+  float local_distance = std::numeric_limits<float>::infinity();
+  float distant_distance = std::numeric_limits<float>::infinity();
 };
+
+/// The shells that the layers are recorded as, front to back.
+std::vector<ShellLight> default_shells() { return {{"local", {}, {}}, {"distant", {}, {}}}; }
+
+void record_light(SurfaceSamples& out, glm::vec3 body, const SpecularLayers& specular) {
+  out.diffuse.push_back(body);
+  out.shells[0].radiance.push_back(specular.local);
+  out.shells[0].hit_distance.push_back(specular.local_distance);
+  out.shells[1].radiance.emplace_back(specular.distant, 1.0F);
+  out.shells[1].hit_distance.push_back(specular.distant_distance);
+}
 
 /// `lobe` is what next-event estimation found for the lobe.
 SpecularLayers trace_specular(const World& world, const RayScene::View& without_reflector,
@@ -116,10 +150,11 @@ SpecularLayers trace_specular(const World& world, const RayScene::View& without_
   if (meets(hit, surface.object)) {
     const glm::vec3 incident = tracing::radiance(world, ray, hit, limits, stream, 1, bounce.pdf);
     layers.local = glm::vec4(lobe + bounce.weight * incident, 1.0F);
+    layers.local_distance = hit.distance;
     hit = without_reflector.intersect(ray, RayKind::reflection);
   }
   layers.distant += bounce.weight * tracing::radiance(world, ray, hit, limits, stream, 1, bounce.pdf);
-  layers.hit_distance = hit.distance;
+  layers.distant_distance = hit.distance;
   return layers;
 }
 
@@ -158,8 +193,8 @@ class PixelLayers {
     fresnel_ += s.fresnel;
     local_ += specular.local;
     distant_ += specular.distant;
-    if (std::isfinite(specular.hit_distance)) {
-      distance_ += specular.hit_distance;
+    if (std::isfinite(specular.distant_distance)) {
+      distance_ += specular.distant_distance;
       ++finite_distances_;
     }
     reflection_ += s.reflection;
@@ -266,13 +301,22 @@ void check_reflector(const World& world, const Camera& camera, int reflector) {
 
 /// The samples of row `y` of the window.
 auto primary_row(const World& world, const Camera& camera, const CameraRays& rays, const PixelWindow& window,
-                 const TraceOptions& options, std::size_t y) {
+                 const TraceOptions& options, std::size_t y, std::span<const glm::vec2> places = {}) {
   const glm::vec3 eye = camera.eye - world.rays.origin();
   const tracing::RowSegment segment{
-      camera.width, window.y + static_cast<int>(y), window.x, window.width, 0, options.samples_per_pixel};
+      camera.width, window.y + static_cast<int>(y), window.x, window.width, 0, options.samples_per_pixel,
+      places};
   return PrimaryRow(world.rays.all(), options.seed, segment, [eye, &rays](glm::vec2 point) {
     return Ray{eye, rays.direction(point)};
   });
+}
+
+void check_places(std::span<const glm::vec2> places) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const glm::vec2 p = places[i];
+    if (p.x >= 0.0F && p.y >= 0.0F && p.x < 1.0F && p.y < 1.0F) continue;
+    throw InvalidArgument("places[" + std::to_string(i) + "]", text_of(p), "numbers in [0, 1)");
+  }
 }
 
 std::uint32_t pixel_number(const PixelWindow& window, std::size_t y, int x) {
@@ -312,6 +356,7 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
   for (std::size_t r = 0; r < traces.size(); ++r) {
     traces[r].layers = Image(window.width, window.height, channel_names());
     rows[r].resize(static_cast<std::size_t>(window.height));
+    for (Row& row : rows[r]) row.samples.shells = default_shells();
   }
   tracing::ProgressCounter progress(options, static_cast<std::size_t>(window.height));
   parallel_for(static_cast<std::size_t>(window.height), 1, [&](std::size_t begin, std::size_t end) {
@@ -340,10 +385,7 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
           SurfaceSamples& out = rows[r][y].samples;
           record_surface(out, world, surface, sample.hit.distance,
                          rays.direction_with_differentials(sample.point), pixel_number(window, y, x));
-          out.diffuse.push_back(body);
-          out.local.push_back(specular.local);
-          out.distant.push_back(specular.distant);
-          out.hit_distance.push_back(specular.hit_distance);
+          record_light(out, body, specular);
           rows[r][y].beauty.push_back(value);
           means[r].add(surface, value, body, specular, out.position.back(), out.part.back());
         }
@@ -367,9 +409,15 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
 }
 
 SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
-                                        const TraceOptions& options) const {
+                                        const TraceOptions& trace_options,
+                                        std::span<const glm::vec2> places) const {
   const World& world = state_->world;
   validate(camera);
+  TraceOptions options = trace_options;
+  if (!places.empty()) {
+    check_places(places);
+    options.samples_per_pixel = static_cast<int>(places.size());
+  }
   tracing::validate(options);
   const PixelWindow window = tracing::window_in(options, camera.width, camera.height);
   check_reflector(world, camera, reflector);
@@ -377,7 +425,7 @@ SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
   std::vector<Row> rows(static_cast<std::size_t>(window.height));
   parallel_for(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
-      auto primary = primary_row(world, camera, rays, window, options, y);
+      auto primary = primary_row(world, camera, rays, window, options, y, places);
       for (int x = 0; x < window.width; ++x) {
         for (int i = 0; i < options.samples_per_pixel; ++i) {
           const PrimarySample& sample = primary.next();

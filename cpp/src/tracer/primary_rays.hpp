@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include <glm/vec2.hpp>
 
@@ -28,6 +29,8 @@ struct RowSegment {
   int columns = 0;
   int first_sample = 0;
   int samples = 0;
+  /// Places of the samples inside every pixel, in [0,1); empty: each sample takes a random one of its stratum.
+  std::span<const glm::vec2> places = {};
 };
 
 /// The samples of a row segment, pixel after pixel, traced a packet at a time.
@@ -62,7 +65,9 @@ class PrimaryRow {
       s.stream = sample_stream(seed_, pixel,
                                static_cast<std::uint32_t>(segment_.first_sample) +
                                    static_cast<std::uint32_t>(next_sample_ - column * per_pixel));
-      s.point = glm::vec2(x, segment_.row) + s.stream.get(camera_dimension);
+      const std::uint64_t sample = next_sample_ - column * per_pixel;
+      s.point = glm::vec2(x, segment_.row) +
+                (segment_.places.empty() ? s.stream.get(camera_dimension) : segment_.places[sample]);
       s.ray = rays[i] = ray_through_(s.point);
     }
     view_.intersect_packet({rays.data(), filled_}, hits.data(), RayKind::camera);

@@ -124,6 +124,9 @@ class _Probe:
         def joined(name: str) -> NDArray[np.float32]:
             return np.concatenate([np.asarray(getattr(trace.samples, name)) for trace in traces])
 
+        def light(shell: int) -> NDArray[np.float32]:
+            return np.concatenate([np.asarray(trace.samples.shells[shell].radiance) for trace in traces])
+
         counts = [len(trace.samples) for trace in traces]
         view = np.repeat(np.arange(len(traces), dtype=np.int32), counts)
         return _Probe(
@@ -136,8 +139,8 @@ class _Probe:
             beauty=np.concatenate([np.asarray(trace.sample_beauty) for trace in traces]).astype(np.float64),
             diffuse=joined("diffuse").astype(np.float64),
             fresnel=joined("fresnel").astype(np.float64),
-            local=joined("local").astype(np.float64),
-            distant=joined("distant").astype(np.float64),
+            local=light(0).astype(np.float64),
+            distant=light(1)[:, :3].astype(np.float64),
         )
 
     @property

@@ -222,10 +222,10 @@ class _ViewBaker:
         return self._store.write_view(index, maps, images_of_trace(trace), Timings(trace_s, build_s, solve_s))
 
     def _values(self, samples: _core.SurfaceSamples, layer: str, has_local: bool) -> FloatArray:
-        local = np.asarray(samples.local)
+        local = np.asarray(samples.shells[0].radiance)
         if layer == "local":
             return local
-        distant = np.asarray(samples.distant)
+        distant = np.asarray(samples.shells[1].radiance)[:, :3]
         return distant if has_local else local[:, :3] + (1.0 - local[:, 3:]) * distant
 
     def _initial(self, part: str, layer: str, index: int) -> FloatArray | None:

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "mirrorbake/core/sampling.hpp"
-#include "mirrorbake/tracer/surface_samples.hpp"
+#include "mirrorbake/surface/surface_samples.hpp"
 
 namespace mirrorbake::testing {
 

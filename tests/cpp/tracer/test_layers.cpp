@@ -9,6 +9,7 @@
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/sampling.hpp"
 #include "mirrorbake/proxy/hull.hpp"
+#include "mirrorbake/surface/shells.hpp"
 #include "mirrorbake/tracer/lobe.hpp"
 #include "scenes.hpp"
 
@@ -43,8 +44,7 @@ float worst_invariant_error(const LayerTrace& trace) {
   float worst = 0.0F;
   const SurfaceSamples& s = trace.samples;
   for (std::size_t i = 0; i < s.size(); ++i) {
-    const glm::vec3 sum =
-        s.diffuse[i] + s.fresnel[i] * (glm::vec3(s.local[i]) + (1.0F - s.local[i].a) * s.distant[i]);
+    const glm::vec3 sum = s.diffuse[i] + s.fresnel[i] * incident_light(s.shells, i);
     const glm::vec3 difference = glm::abs(sum - trace.sample_beauty[i]);
     const float scale = std::max(1e-3F, glm::length(trace.sample_beauty[i]));
     worst = std::max(worst, std::max(difference.x, std::max(difference.y, difference.z)) / scale);
@@ -72,8 +72,9 @@ TEST_P(LayerInvariant, HoldsPerSampleForNestedSelfReflection) {
     trace_options.max_specular_depth = depth;
     const LayerTrace trace = tracer.trace_layers(room_camera(), ring, trace_options);
     ASSERT_GT(trace.samples.size(), 500u);
-    const auto local = std::count_if(trace.samples.local.begin(), trace.samples.local.end(),
-                                     [](const glm::vec4& l) { return l.a == 1.0F; });
+    const auto local =
+        std::count_if(trace.samples.shells[0].radiance.begin(), trace.samples.shells[0].radiance.end(),
+                      [](const glm::vec4& l) { return l.a == 1.0F; });
     EXPECT_GT(local, 50);
     EXPECT_LT(local, static_cast<std::ptrdiff_t>(trace.samples.size()) - 50);
     // The two integrators add the same terms in another order: a few roundings per bounce.
@@ -128,8 +129,9 @@ TEST(Layers, InvariantHoldsForRoughReflectorsUnderEveryKindOfLight) {
         options.max_specular_depth = depth;
         const LayerTrace trace = tracer.trace_layers(room_camera(), ring, options);
         ASSERT_GT(trace.samples.size(), 500u);
-        const auto local = std::count_if(trace.samples.local.begin(), trace.samples.local.end(),
-                                         [](const glm::vec4& l) { return l.a == 1.0F; });
+        const auto local =
+            std::count_if(trace.samples.shells[0].radiance.begin(), trace.samples.shells[0].radiance.end(),
+                          [](const glm::vec4& l) { return l.a == 1.0F; });
         EXPECT_GT(local, 50);
         EXPECT_LT(worst_invariant_error(trace), 1e-5F);
       }
@@ -194,7 +196,7 @@ TEST(Layers, ConvexReflectorHasNoLocalLayer) {
   const Tracer tracer(scene, {.indirect = IndirectLight::none});
   const LayerTrace trace = tracer.trace_layers(room_camera(), box, {});
   ASSERT_GT(trace.samples.size(), 1000u);
-  for (const glm::vec4& local : trace.samples.local) EXPECT_EQ(local, glm::vec4(0.0F));
+  for (const glm::vec4& local : trace.samples.shells[0].radiance) EXPECT_EQ(local, glm::vec4(0.0F));
 }
 
 // A mirror in front of which the same object has a flap: the ray through the flap must show what is behind
@@ -228,10 +230,10 @@ TEST(Layers, DistantLayerLooksThroughTheReflector) {
   const LayerTrace trace = tracer.trace_layers(camera, reflector, options);
   ASSERT_EQ(trace.samples.size(), 8u * 8u * 16u);
   for (std::size_t i = 0; i < trace.samples.size(); ++i) {
-    EXPECT_EQ(trace.samples.local[i].a, 1.0F);
-    EXPECT_EQ(trace.samples.distant[i], glm::vec3(1, 2, 3));
+    EXPECT_EQ(trace.samples.shells[0].radiance[i].a, 1.0F);
+    EXPECT_EQ(trace.samples.shells[1].radiance[i], glm::vec4(1, 2, 3, 1));
     // From z = 0 to z = 5 along the reflection.
-    EXPECT_NEAR(trace.samples.hit_distance[i], 5.0F / trace.samples.reflection[i].z, 1e-4F);
+    EXPECT_NEAR(trace.samples.shells[1].hit_distance[i], 5.0F / trace.samples.reflection[i].z, 1e-4F);
     EXPECT_EQ(trace.samples.part[i], 0);
   }
 }
@@ -261,8 +263,8 @@ TEST(Layers, SeveralReflectorsInOnePassAreWhatTheyAreAlone) {
     ASSERT_GT(alone.samples.size(), 300u);
     EXPECT_EQ(together[i].layers.pixels, alone.layers.pixels);
     EXPECT_EQ(together[i].samples.pixel, alone.samples.pixel);
-    EXPECT_EQ(together[i].samples.local, alone.samples.local);
-    EXPECT_EQ(together[i].samples.distant, alone.samples.distant);
+    EXPECT_EQ(together[i].samples.shells[0].radiance, alone.samples.shells[0].radiance);
+    EXPECT_EQ(together[i].samples.shells[1].radiance, alone.samples.shells[1].radiance);
     EXPECT_EQ(together[i].sample_beauty, alone.sample_beauty);
     EXPECT_LT(worst_invariant_error(together[i]), 1e-5F);
   }
@@ -288,9 +290,9 @@ TEST(Layers, PolygonsOnTheConvexHullHaveNoLocalLight) {
     for (std::size_t i = 0; i < trace.samples.size(); ++i) {
       if (on_hull[trace.samples.triangle[i]] != 0) {
         ++hull;
-        EXPECT_EQ(trace.samples.local[i].a, 0.0F);
+        EXPECT_EQ(trace.samples.shells[0].radiance[i].a, 0.0F);
       } else {
-        covered += trace.samples.local[i].a == 1.0F ? 1 : 0;
+        covered += trace.samples.shells[0].radiance[i].a == 1.0F ? 1 : 0;
       }
     }
     EXPECT_GT(hull, 1000);
@@ -341,10 +343,10 @@ TEST(Layers, LocalSilhouettesHaveFractionalAlphaOverAnUnchangedDistantLayer) {
     if (with.samples.triangle[i] >= plate.triangles.size()) continue;  // the ball itself
     while (j < without.samples.size() && without.samples.position[j] != with.samples.position[i]) ++j;
     ASSERT_LT(j, without.samples.size());
-    EXPECT_EQ(with.samples.distant[i], without.samples.distant[j]);
-    EXPECT_EQ(with.samples.hit_distance[i], without.samples.hit_distance[j]);
+    EXPECT_EQ(with.samples.shells[1].radiance[i], without.samples.shells[1].radiance[j]);
+    EXPECT_EQ(with.samples.shells[1].hit_distance[i], without.samples.shells[1].hit_distance[j]);
     ++compared;
-    covered += with.samples.local[i].a == 1.0F ? 1 : 0;
+    covered += with.samples.shells[0].radiance[i].a == 1.0F ? 1 : 0;
   }
   EXPECT_GT(compared, 5000);
   EXPECT_GT(covered, 500);
@@ -457,8 +459,8 @@ TEST(Layers, NothingBehindGivesInfiniteDistanceAndTheSky) {
   camera.width = camera.height = 16;
   const LayerTrace trace = tracer.trace_layers(camera, ball, {});
   for (std::size_t i = 0; i < trace.samples.size(); ++i) {
-    EXPECT_TRUE(std::isinf(trace.samples.hit_distance[i]));
-    EXPECT_NEAR(trace.samples.distant[i].x, 2.0F, 1e-6F);
+    EXPECT_TRUE(std::isinf(trace.samples.shells[1].hit_distance[i]));
+    EXPECT_NEAR(trace.samples.shells[1].radiance[i].x, 2.0F, 1e-6F);
     EXPECT_EQ(trace.samples.fresnel[i], glm::vec3(0.5F, 0.6F, 0.7F));
   }
   EXPECT_NEAR(trace.layers.at(0, 0)[0], 2.0F, 1e-6F);  // the sky beside the ball
@@ -493,8 +495,8 @@ TEST(Layers, ImageAveragesTheSamples) {
            i < trace.samples.size() && trace.samples.pixel[i] == static_cast<unsigned>(y * camera.width + x);
            ++i) {
         ++count;
-        sum_alpha += trace.samples.local[i].a;
-        sum_green += trace.samples.distant[i].g;
+        sum_alpha += trace.samples.shells[0].radiance[i].a;
+        sum_green += trace.samples.shells[1].radiance[i].g;
         sum_normal += trace.samples.normal[i].y;
       }
       const float* pixel = trace.layers.at(x, y);
@@ -529,7 +531,7 @@ TEST(Layers, VisibilityIsTheGeometryOfTheLayers) {
   EXPECT_EQ(a.dreflection_dy, b.dreflection_dy);
   EXPECT_EQ(a.fresnel, b.fresnel);
   EXPECT_EQ(a.albedo, b.albedo);
-  EXPECT_TRUE(b.diffuse.empty() && b.local.empty() && b.distant.empty() && b.hit_distance.empty());
+  EXPECT_TRUE(b.diffuse.empty() && b.shells.empty());
 }
 
 // Shading normals tilted far off their triangles: the recorded direction must leave the surface, and stay the
@@ -562,8 +564,8 @@ TEST(Layers, SameBitsOnAnyNumberOfThreads) {
   const ThreadLimit one(1);
   const LayerTrace single = tracer.trace_layers(room_camera(), ring, {});
   EXPECT_EQ(many.layers.pixels, single.layers.pixels);
-  EXPECT_EQ(many.samples.local, single.samples.local);
-  EXPECT_EQ(many.samples.distant, single.samples.distant);
+  EXPECT_EQ(many.samples.shells[0].radiance, single.samples.shells[0].radiance);
+  EXPECT_EQ(many.samples.shells[1].radiance, single.samples.shells[1].radiance);
   EXPECT_EQ(many.sample_beauty, single.sample_beauty);
 }
 

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/surface/shells.hpp"
 #include "scenes.hpp"
 
 namespace mirrorbake {
@@ -188,11 +189,10 @@ TEST(Opacity, OfReflectorsAndWhatTheyReflectKeepsTheLayersSum) {
   ASSERT_GT(s.size(), 300U);
   std::size_t local = 0;
   for (std::size_t i = 0; i < s.size(); ++i) {
-    const glm::vec3 sum =
-        s.diffuse[i] + s.fresnel[i] * (glm::vec3(s.local[i]) + (1.0F - s.local[i].a) * s.distant[i]);
+    const glm::vec3 sum = s.diffuse[i] + s.fresnel[i] * incident_light(s.shells, i);
     const float scale = std::max(1e-3F, glm::length(trace.sample_beauty[i]));
     ASSERT_LT(glm::length(sum - trace.sample_beauty[i]) / scale, 1e-5F);
-    local += s.local[i].a == 1.0F ? 1 : 0;
+    local += s.shells[0].radiance[i].a == 1.0F ? 1 : 0;
   }
   EXPECT_GT(local, 50U);
 }

@@ -120,7 +120,7 @@ TEST(Rays, NoLeakAndNoSelfIntersectionFromMillimetresToHundredKilometres) {
     const LayerTrace trace = tracer.trace_layers(camera, ball, options);
     ASSERT_GT(trace.samples.size(), 1000u);
     int local = 0;
-    for (const glm::vec4& value : trace.samples.local) local += value.a != 0.0F ? 1 : 0;
+    for (const glm::vec4& value : trace.samples.shells[0].radiance) local += value.a != 0.0F ? 1 : 0;
     EXPECT_EQ(local, 0);
   }
 }

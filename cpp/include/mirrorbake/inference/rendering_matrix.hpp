@@ -8,7 +8,7 @@
 #include "mirrorbake/envmap/cube_pyramid.hpp"
 #include "mirrorbake/envmap/cube_sampling.hpp"
 #include "mirrorbake/proxy/proxy.hpp"
-#include "mirrorbake/tracer/surface_samples.hpp"
+#include "mirrorbake/surface/surface_samples.hpp"
 
 /// The rendering matrix ([PEM] §4 "EM Inference"; spec I1): rendering with an environment map is linear in the
 /// map's texels, b = A x.

@@ -10,7 +10,7 @@
 #include "mirrorbake/image/image.hpp"
 #include "mirrorbake/inference/rendering_matrix.hpp"
 #include "mirrorbake/proxy/proxy.hpp"
-#include "mirrorbake/tracer/surface_samples.hpp"
+#include "mirrorbake/surface/surface_samples.hpp"
 
 /// The run time in software: the reflector drawn from its environment maps, without tracing reflections
 /// ([PEM] §4–5; spec R2).

@@ -12,8 +12,8 @@
 #include "mirrorbake/image/image.hpp"
 #include "mirrorbake/projection/projection.hpp"
 #include "mirrorbake/scene/scene.hpp"
+#include "mirrorbake/surface/surface_samples.hpp"
 #include "mirrorbake/tracer/camera.hpp"
-#include "mirrorbake/tracer/surface_samples.hpp"
 
 /// Ray tracing with Embree, which stays behind this header.
 namespace mirrorbake {
@@ -132,8 +132,10 @@ class Tracer {
                                        const TraceOptions& options) const;
 
   /// Only what is visible of `reflector`: the geometry part of SurfaceSamples, by the same camera rays as
-  /// trace_layers with the same options.
-  SurfaceSamples trace_visibility(const Camera& camera, int reflector, const TraceOptions& options) const;
+  /// trace_layers with the same options. With `places`, numbers in [0, 1) from the pixel's top left corner, the rays go
+  /// through those places of every pixel instead, as a renderer's lookups do, and there are as many samples.
+  SurfaceSamples trace_visibility(const Camera& camera, int reflector, const TraceOptions& options,
+                                  std::span<const glm::vec2> places = {}) const;
 
   /// The radiance that arrives at `origin`, as an environment map (spec T2): rays straight through the texels
   /// of the projection, which pass through the objects in `hidden`. What the rays show still bears those

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -9,6 +10,15 @@
 #include <glm/vec4.hpp>
 
 namespace mirrorbake {
+
+/// The light that the reflected rays of SurfaceSamples bring from one shell of the environment ([PEM] §4 has two, "this method
+/// easily generalizes"): what a ray meets first of the shell's own kind, with the shells in front of it left out. One
+/// entry per sample.
+struct ShellLight {
+  std::string name;
+  std::vector<glm::vec4> radiance;  ///< incident, premultiplied, and α; in the last shell α is 1
+  std::vector<float> hit_distance;  ///< along the ray to what it meets, metres; +inf: nothing
+};
 
 /// Where the samples of an image's pixels first meet the reflector: what a renderer with environment maps needs to
 /// know, and so the common ground of the rendering matrix and of the run time. One entry per sample that sees
@@ -38,11 +48,10 @@ struct SurfaceSamples {
   std::vector<glm::vec3> fresnel;  ///< F of the first bounce, per channel
   std::vector<glm::vec3> albedo;   ///< diffuse albedo with texture, times (1 − F) under a coat
 
-  // The light that was traced, one entry per sample, or empty when only visibility was asked for.
-  std::vector<glm::vec3> diffuse;   ///< D: radiance that the body reflects and emits
-  std::vector<glm::vec4> local;     ///< incident radiance from the reflector itself, premultiplied, and α
-  std::vector<glm::vec3> distant;   ///< incident radiance through the reflector
-  std::vector<float> hit_distance;  ///< along its ray to what the distant ray hits; +inf: nothing
+  // The light that was traced; empty when only visibility was asked for.
+  std::vector<glm::vec3> diffuse;  ///< D: radiance that the body reflects and emits, one entry per sample
+  /// Front to back, so that the incident radiance is L₀ + (1 − α₀)(L₁ + (1 − α₁)(…)).
+  std::vector<ShellLight> shells;
 
   std::size_t size() const { return pixel.size(); }
 };

@@ -1,0 +1,140 @@
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <string>
+#include <vector>
+
+#include "bind.hpp"
+#include "mirrorbake/surface/run_time_model.hpp"
+#include "mirrorbake/surface/surface_samples.hpp"
+
+namespace mirrorbake::bindings {
+namespace {
+
+// Read-only views that keep the owner alive.
+template <auto member>
+void def_vectors(nb::class_<SurfaceSamples>& c, const char* name, const char* doc) {
+  c.def_prop_ro(
+      name, [](nb::handle self) { return vectors_view(nb::cast<const SurfaceSamples&>(self).*member, self); },
+      doc);
+}
+template <auto member>
+void def_scalars(nb::class_<SurfaceSamples>& c, const char* name, const char* doc) {
+  c.def_prop_ro(
+      name, [](nb::handle self) { return scalars_view(nb::cast<const SurfaceSamples&>(self).*member, self); },
+      doc);
+}
+
+void bind_shell_light(nb::module_& m) {
+  nb::class_<ShellLight>(
+      m, "ShellLight",
+      "Light that the reflected rays of SurfaceSamples bring from one shell of the environment.")
+      .def_ro("name", &ShellLight::name)
+      .def_prop_ro(
+          "radiance",
+          [](nb::handle self) { return vectors_view(nb::cast<const ShellLight&>(self).radiance, self); },
+          "(n, 4): incident radiance, premultiplied, and alpha, which is 1 in the last shell.")
+      .def_prop_ro(
+          "hit_distance",
+          [](nb::handle self) { return scalars_view(nb::cast<const ShellLight&>(self).hit_distance, self); },
+          "(n,): metres along the ray to what it meets; inf: nothing.");
+}
+
+void bind_samples(nb::module_& m) {
+  nb::class_<SurfaceSamples> c(
+      m, "SurfaceSamples",
+      "Where the samples of an image's pixels first meet the reflector: one entry "
+      "per sample that sees it, ordered by\n"
+      "pixel, then by sample. All arrays are read-only views; `diffuse` and `shells` "
+      "are empty when no light was traced.");
+  c.def_ro("width", &SurfaceSamples::width, "Of the image, pixels.");
+  c.def_ro("height", &SurfaceSamples::height, "Of the image, pixels.");
+  c.def_ro("samples_per_pixel", &SurfaceSamples::samples_per_pixel);
+  c.def("__len__", &SurfaceSamples::size);
+  using S = SurfaceSamples;
+  def_scalars<&S::pixel>(c, "pixel", "(n,) uint32: y * width + x.");
+  def_scalars<&S::part>(c, "part", "(n,) uint16: part of the reflector.");
+  def_scalars<&S::triangle>(c, "triangle", "(n,) uint32: triangle of the reflector's mesh.");
+  def_vectors<&S::barycentric>(c, "barycentric",
+                               "(n, 2): weights of the triangle's second and third vertex.");
+  def_vectors<&S::position>(c, "position", "(n, 3): world space, metres.");
+  def_vectors<&S::normal>(c, "normal", "(n, 3): unit shading normal, towards the eye.");
+  def_vectors<&S::reflection>(c, "reflection", "(n, 3): unit direction r = 2(n·v)n - v.");
+  def_vectors<&S::dposition_dx>(c, "dposition_dx", "(n, 3): change of `position` per pixel to the right.");
+  def_vectors<&S::dposition_dy>(c, "dposition_dy", "(n, 3): change of `position` per pixel down.");
+  def_vectors<&S::dreflection_dx>(c, "dreflection_dx",
+                                  "(n, 3): change of `reflection` per pixel to the right.");
+  def_vectors<&S::dreflection_dy>(c, "dreflection_dy", "(n, 3): change of `reflection` per pixel down.");
+  def_vectors<&S::fresnel>(c, "fresnel", "(n, 3): Fresnel reflectance F of the first bounce.");
+  def_vectors<&S::albedo>(c, "albedo", "(n, 3): diffuse albedo, times (1 - F) under a coat.");
+  def_vectors<&S::diffuse>(c, "diffuse", "(n, 3): radiance D that the body reflects and emits.");
+  c.def_prop_ro(
+      "shells",
+      [](nb::handle self) {
+        nb::list shells;
+        for (const ShellLight& shell : nb::cast<const SurfaceSamples&>(self).shells) {
+          shells.append(nb::cast(shell, nb::rv_policy::reference_internal, self));
+        }
+        return shells;
+      },
+      nb::sig("def shells(self) -> list[ShellLight]"),
+      "Front to back: the incident radiance is L0 + (1 - a0)(L1 + ...).");
+}
+
+RunTimeModel checked(RunTimeModel model) {
+  validate(model);
+  return model;
+}
+
+void bind_run_time(nb::module_& m) {
+  const RunTimeModel web = web_run_time();
+  nb::class_<RunTimeModel>(m, "RunTimeModel",
+                           "How the renderer that will draw the maps reads them: what a map is inferred for.")
+      .def(
+          "__init__",
+          [](RunTimeModel* self, std::string name, std::vector<glm::vec2> places, float footprint_scale,
+             const std::string& filter, int max_taps, const std::string& coordinates,
+             const std::string& fresnel, int texel_bits) {
+            new (self) RunTimeModel(checked(
+                {std::move(name), std::move(places), footprint_scale, parse_lookup_filter(filter), max_taps,
+                 parse_coordinate_source(coordinates), parse_fresnel_source(fresnel), texel_bits}));
+          },
+          nb::kw_only(), nb::arg("name"), nb::arg("places"), nb::arg("footprint_scale"),
+          nb::arg("filter") = "anisotropic", nb::arg("max_taps") = web.max_taps,
+          nb::arg("coordinates") = "per_pixel", nb::arg("fresnel") = "exact",
+          nb::arg("texel_bits") = RunTimeModel{}.texel_bits)
+      .def_ro("name", &RunTimeModel::name)
+      .def_ro("places", &RunTimeModel::places,
+              "Where in a pixel the lookups lie: (x, y) in [0, 1) from its top left corner.")
+      .def_ro("footprint_scale", &RunTimeModel::footprint_scale,
+              "Size of a lookup's footprint in pixels, in (0, 1024].")
+      .def_prop_ro(
+          "filter", [](const RunTimeModel& self) { return std::string(name_of(self.filter)); },
+          "nearest, bilinear, trilinear or anisotropic.")
+      .def_ro("max_taps", &RunTimeModel::max_taps, "Of `anisotropic`, 1 to 16.")
+      .def_prop_ro(
+          "coordinates", [](const RunTimeModel& self) { return std::string(name_of(self.coordinates)); },
+          "per_pixel or per_vertex.")
+      .def_prop_ro(
+          "fresnel", [](const RunTimeModel& self) { return std::string(name_of(self.fresnel)); },
+          "exact, table or schlick.")
+      .def_ro("texel_bits", &RunTimeModel::texel_bits,
+              "Of a channel in the texture format: 32, 16 (half) or 9 (shared exponent, RGB9E5).")
+      .def(
+          "__eq__", [](const RunTimeModel& a, const RunTimeModel& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"));
+  m.def(
+      "run_time_model", [](const std::string& name) { return run_time_model(name); }, nb::arg("name"),
+      "Web (four lookups per pixel on a rotated grid, footprint 1/2, up to 4 taps), Web1 (one lookup) or\n"
+      "Reference (16 lookups, footprint 1/4).");
+}
+
+}  // namespace
+
+void bind_surface(nb::module_& m) {
+  bind_shell_light(m);
+  bind_samples(m);
+  bind_run_time(m);
+}
+
+}  // namespace mirrorbake::bindings

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from mirrorbake import _core
 from mirrorbake.bake.bake import bake
 from mirrorbake.errors import InputError
 from mirrorbake.evaluate.contact_sheet import contact_sheet
-from mirrorbake.evaluate.contenders import CONTENDERS
 from mirrorbake.evaluate.demo import demo_config
-from mirrorbake.evaluate.evaluate import Evaluation, ViewMetrics, evaluate
+from mirrorbake.evaluate.evaluate import Evaluation, evaluate
 from mirrorbake.evaluate.metrics import psnr
-from mirrorbake.evaluate.table import metrics_table
 from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.run_time import RunTime
 from mirrorbake.pem.store import PemStore
@@ -62,19 +58,19 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> Baked:
     return Baked(directory, stage.planned(summary.plan), evaluate(directory, None, stage), reports)
 
 
-def mean(evaluation: Evaluation, contender: str, *, sampled: bool) -> float:
-    value = evaluation.mean_psnr(contender, sampled=sampled)
+def mean(evaluation: Evaluation, contender: str, place: str) -> float:
+    value = evaluation.mean(contender, place)
     assert value is not None
     return value
 
 
 def test_the_pem_beats_both_static_maps_on_and_between_its_samples(baked: Baked) -> None:
-    # The paper's set-up leads by more than 10 dB on the samples and 8 dB between them; maps and pictures of
-    # this size cost a few dB of that.
-    for sampled, lead in ((True, 8.0), (False, 6.0)):
-        pem = mean(baked.evaluation, "pem", sampled=sampled)
-        infinite = mean(baked.evaluation, "static_infinite", sampled=sampled)
-        box = mean(baked.evaluation, "static_proxy", sampled=sampled)
+    # At full size the lead is more than 10 dB; maps and pictures of this size, and targets of 8 samples whose
+    # noise the maps hold, cost a few dB of that.
+    for place, lead in (("on", 6.5), ("between", 6.0)):
+        pem = mean(baked.evaluation, "pem", place)
+        infinite = mean(baked.evaluation, "static_infinite", place)
+        box = mean(baked.evaluation, "static_proxy", place)
         assert pem - infinite > lead
         assert pem - box > lead - 3.0
         assert box > infinite
@@ -191,16 +187,6 @@ def test_the_stored_reference_is_what_is_traced_again(baked: Baked) -> None:
     assert psnr(stored.object, traced.object, mask) > 60
 
 
-def test_metrics_json_holds_every_view(baked: Baked) -> None:
-    figures: dict[str, Any] = json.loads((baked.directory / "metrics.json").read_text())
-    assert [view["t"] for view in figures["views"]] == [0, 0.25, 0.5, 0.75, 1]
-    for view, line in zip(figures["views"], baked.evaluation.views, strict=True):
-        assert view["psnr"] == line.psnr
-        assert view.keys() == {"t", "sampled", "trace_s", "build_s", "solve_s", "psnr"}
-    assert figures["config"]["maps"]["size"] == 64
-    assert "sRGB" in figures["display_transform"]
-
-
 def test_progress_counts_up_to_the_number_of_views(baked: Baked) -> None:
     done = [report[0] for report in baked.reports]
     assert done == sorted(done)
@@ -220,37 +206,6 @@ def test_the_contact_sheet_is_a_picture_with_all_contenders(baked: Baked, tmp_pa
         cell = row[(2 * column + 1) * width // 8]
         assert (cell < 0.95).any()
     assert [path.name for path in tmp_path.iterdir()] == ["sheet.png"]
-
-
-def test_the_table_shows_means_and_marks_what_does_not_exist() -> None:
-    views = [
-        ViewMetrics(0.0, True, 1.0, 2.0, 3.0, {"pem": 30.0, "static_infinite": 20.0, "static_proxy": None}),
-        ViewMetrics(
-            0.5, False, 1.0, None, None, {"pem": 28.0, "static_infinite": 20.0, "static_proxy": None}
-        ),
-        ViewMetrics(1.0, True, 1.0, 2.0, 3.0, {"pem": 31.0, "static_infinite": 21.0, "static_proxy": None}),
-    ]
-    output = io.StringIO()
-    Console(file=output, width=120).print(metrics_table(Evaluation(views, {})))
-    lines = output.getvalue().splitlines()
-    on_samples = next(line for line in lines if "mean on samples" in line)
-    between = next(line for line in lines if "mean half-way" in line)
-    assert "30.50" in on_samples
-    assert "28.00" in between
-    assert "–" in on_samples
-
-
-def test_a_long_evaluation_is_thinned_out_in_the_table() -> None:
-    psnr_values: dict[str, float | None] = dict.fromkeys(CONTENDERS, 30.0)
-    views = [ViewMetrics(i / 198, i % 2 == 0, 1.0, 1.0, 1.0, psnr_values) for i in range(199)]
-    table = metrics_table(Evaluation(views, {}))
-    assert 10 < table.row_count < 30
-
-
-def test_equal_images_are_null_in_json() -> None:
-    views = [ViewMetrics(0.0, True, 1.0, 1.0, 1.0, dict.fromkeys(CONTENDERS, math.inf))]
-    figures = json.loads(Evaluation(views, {}).to_json())
-    assert figures["views"][0]["psnr"]["pem"] is None
 
 
 TURNED = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]], np.float32)
@@ -300,8 +255,8 @@ def test_under_a_panorama_the_distant_map_lies_at_infinity(tmp_path: Path) -> No
     assert header.static["proxy"] is None
     assert all(part["layers"]["distant"]["shape"] == "infinite" for part in header.parts)
     evaluation = evaluate(tmp_path / "pem", None, stage)
-    assert all(view.psnr["static_proxy"] is None for view in evaluation.views)
-    lead = mean(evaluation, "pem", sampled=True) - mean(evaluation, "static_infinite", sampled=True)
+    assert all("static_proxy" not in view.metrics["psnr"] for view in evaluation.views)
+    lead = mean(evaluation, "pem", "on") - mean(evaluation, "static_infinite", "on")
     assert lead > 3.0
     pem = open_pem(tmp_path / "pem", stage)
     contact_sheet(pem, tmp_path / "sheet.png")

@@ -1,13 +1,26 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter, shift
 
-from mirrorbake.evaluate.metrics import display_referred, mean_or_none, psnr
+from mirrorbake.evaluate.metrics import (
+    display_referred,
+    flip,
+    mean_or_none,
+    psnr,
+    sliding,
+    ssim,
+    worst_error,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 def test_the_transfer_function_has_the_published_values_of_srgb() -> None:
@@ -66,3 +79,84 @@ def test_shapes_that_do_not_fit_are_rejected() -> None:
 def test_mean_leaves_out_what_is_not_a_number() -> None:
     assert mean_or_none([1.0, None, 3.0, math.inf, math.nan]) == 2.0
     assert mean_or_none([None, math.nan]) is None
+
+
+def linear(shown: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Inverse of `display_referred`."""
+    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def picture(seed: int, shape: tuple[int, int] = (64, 80)) -> NDArray[np.float64]:
+    """Smooth coloured structure of some ten pixels, in display values 0.2 to 0.8."""
+    noise = np.random.default_rng(seed).normal(size=(*shape, 3))
+    smooth = gaussian_filter(noise, (3, 3, 0))
+    shown: NDArray[np.float64] = 0.5 + 0.3 * smooth / np.abs(smooth).max()
+    return shown
+
+
+def test_psnr_of_known_noise_is_its_closed_form() -> None:
+    # The yardstick: noise of standard deviation σ in display values has -20 log10 σ. Of 57,600 values the
+    # mean square scatters by √(2/57600) = 0.6 %: 0.026 dB.
+    shown = picture(1, (120, 160))
+    everywhere = np.ones(shown.shape[:2], bool)
+    for sigma in (0.001, 0.01, 0.05):
+        noise = np.random.default_rng(2).normal(scale=sigma, size=shown.shape)
+        value = psnr(linear(shown + noise), linear(shown), everywhere)
+        assert value == pytest.approx(-20 * math.log10(sigma), abs=0.1)
+
+
+def test_equal_images_have_the_best_value_of_every_metric() -> None:
+    image = linear(picture(3))
+    everywhere = np.ones(image.shape[:2], bool)
+    assert psnr(image, image, everywhere) == math.inf
+    assert ssim(image, image, everywhere) == pytest.approx(1.0)
+    assert flip(image, image, everywhere) == pytest.approx(0.0, abs=1e-6)
+    assert worst_error(image, image, everywhere) == 0.0
+    assert sliding((image, image), (image, image), everywhere) == 0.0
+
+
+def test_every_metric_gets_worse_with_more_noise() -> None:
+    shown = picture(4)
+    noise = np.random.default_rng(5).normal(size=shown.shape)
+    image, little, much = linear(shown), linear(shown + 0.02 * noise), linear(shown + 0.1 * noise)
+    everywhere = np.ones(shown.shape[:2], bool)
+    assert psnr(little, image, everywhere) > psnr(much, image, everywhere) + 10
+    assert ssim(little, image, everywhere) > ssim(much, image, everywhere) + 0.1
+    assert flip(little, image, everywhere) + 0.02 < flip(much, image, everywhere)
+    assert 4 * worst_error(little, image, everywhere) < worst_error(much, image, everywhere)
+
+
+def test_the_worst_pixels_are_one_in_a_hundred() -> None:
+    black, image = np.zeros((10, 20, 3), np.float32), np.zeros((10, 20, 3), np.float32)
+    image[3, 4], image[5, 6] = 1.0, 1.0
+    assert worst_error(image, black, np.ones((10, 20), bool)) == pytest.approx(1.0)
+    image[5, 6] = 0.0
+    # One of the two worst is black: √½.
+    assert worst_error(image, black, np.ones((10, 20), bool)) == pytest.approx(math.sqrt(0.5))
+
+
+def test_sliding_is_the_difference_of_the_motions() -> None:
+    a = picture(6, (96, 120))
+    everywhere = np.ones(a.shape[:2], bool)
+
+    def moved(pixels: float) -> NDArray[np.float32]:
+        return linear(shift(a, (0, pixels, 0), order=3, mode="wrap"))
+
+    frames = {pixels: moved(pixels) for pixels in (0.0, 0.5, 1.0, 2.0)}
+    # What moves as it should slides by nothing; what stands still slides by all of the motion.
+    assert sliding((frames[0.0], frames[1.0]), (frames[0.0], frames[1.0]), everywhere) == 0.0
+    for pixels in (0.5, 1.0, 2.0):
+        still = sliding((frames[0.0], frames[0.0]), (frames[0.0], frames[pixels]), everywhere)
+        assert still == pytest.approx(pixels, rel=0.1)
+    half = sliding((frames[0.0], frames[0.5]), (frames[0.0], frames[1.0]), everywhere)
+    assert half == pytest.approx(0.5, rel=0.15)
+
+
+def test_metrics_of_nothing_are_not_a_number() -> None:
+    image, nothing = linear(picture(7)), np.zeros((64, 80), bool)
+    for metric in (psnr, ssim, flip, worst_error):
+        assert math.isnan(metric(image, image, nothing))
+    assert math.isnan(sliding((image, image), (image, image), nothing))
+    # No texture determines a motion on a plain wall.
+    wall = np.full((64, 80, 3), 0.3, np.float32)
+    assert math.isnan(sliding((wall, wall), (wall, wall), ~nothing))

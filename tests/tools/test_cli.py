@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 
 from mirrorbake import _core
 from mirrorbake.commands.main import app
+from mirrorbake.evaluate.contenders import CONTENDERS
 from mirrorbake.pem.store import GROUP_NAME, PemStore
 from mirrorbake.scene.load import load_config
 from mirrorbake.scene.plan import DECIDED_KEYS
@@ -129,7 +130,7 @@ def test_a_process_ends_with_the_status_and_the_streams_of_the_manual(tmp_path: 
     assert (result.returncode, result.stdout) == (0, ""), result.stderr
     result = run_process("evaluate", tmp_path / "pem", "--json")
     assert result.returncode == 0
-    assert len(json.loads(result.stdout)["views"]) == 1
+    assert json.loads(result.stdout)["views"][0]["place"] == "on"
 
 
 @pytest.mark.parametrize("command", ["bake", "analyze", "evaluate", "render", "demo"])
@@ -396,17 +397,15 @@ def test_evaluate_writes_the_figures_it_prints(baked: Path) -> None:
     written = json.loads((baked / "metrics.json").read_text())
     assert printed == written
     views = written["views"]
-    assert [view["t"] for view in views] == [0, 0.25, 0.5, 0.75, 1]
-    assert [view["sampled"] for view in views] == [True, False, True, False, True]
+    assert [view["place"] for view in views[:3]] == ["on", "between", "off_1"]
     for view in views:
-        assert view["psnr"].keys() == {"pem", "static_infinite", "static_proxy"}
-        assert all(5 < value < 80 for value in view["psnr"].values())
-        assert view["trace_s"] > 0
-        assert (view["build_s"] is None) == (view["solve_s"] is None) == (not view["sampled"])
+        assert view["psnr"].keys() == set(CONTENDERS)
+        assert all(5 < row["reference"] < 80 for row in view["psnr"].values())
+        assert all(row["reference"] + 5.9 < view["ceiling"] for row in view["psnr"].values())
     table = run("evaluate", baked)
     assert table.returncode == 0
     assert "PEM" in table.stdout
-    assert f"{views[0]['psnr']['pem']:.2f}" in table.stdout
+    assert f"{views[0]['psnr']['pem']['reference']:.2f}" in table.stdout
 
 
 def test_the_demonstration_leaves_figures_and_a_contact_sheet(
@@ -416,9 +415,9 @@ def test_the_demonstration_leaves_figures_and_a_contact_sheet(
     monkeypatch.setattr("mirrorbake.evaluate.demo.demo_config", lambda: load_config(scene))
     result = run("demo", "--out", tmp_path / "demo")
     assert result.returncode == 0, result.stderr
-    assert "mean half-way" in result.stdout
+    assert "half-way between two" in result.stdout
     names = {path.name for path in (tmp_path / "demo").iterdir()}
-    assert names == {"pem.zarr", "metrics.json", "contact-sheet.png"}
+    assert names == {"pem.zarr", "metrics.json", "contact-sheet.png", "references"}
 
 
 @pytest.mark.parametrize("name", ["view.exr", "view.png"])

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
 from mirrorbake.commands.options import (
@@ -14,13 +18,21 @@ from mirrorbake.commands.progress import messages, progress
 
 
 @reports_errors
-def evaluate_command(directory: Folder, json: Json = False, threads: Threads = 0) -> None:
-    """Compare a PEM and static maps with ray tracing, on the sampled views and half-way between them."""
+def evaluate_command(
+    directory: Folder,
+    json: Json = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="Look at every sample and between every two, not at a selection.")
+    ] = False,
+    threads: Threads = 0,
+) -> None:
+    """Compare a PEM and its rivals with independent ray tracing, on its samples, between and off them."""
     from mirrorbake.evaluate.evaluate import METRICS_NAME, evaluate
 
     limit = _core.ThreadLimit(threads)
     with progress() as add_bar:
-        evaluation = evaluate(directory, add_bar("evaluate"))
+        evaluation = evaluate(directory, add_bar("evaluate"), every_view=every)
     del limit
     print_figures(evaluation, json)
-    messages.print(f"wrote {directory / METRICS_NAME}", markup=False, soft_wrap=True)
+    if evaluation.written:
+        messages.print(f"wrote {directory / METRICS_NAME}", markup=False, soft_wrap=True)

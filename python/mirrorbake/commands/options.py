@@ -35,14 +35,17 @@ def _parse_set(text: str) -> tuple[tuple[str, ...], Any]:
 
 
 def print_figures(evaluation: Evaluation, json: bool) -> None:
-    from mirrorbake.evaluate.table import metrics_table
+    from mirrorbake.evaluate.table import metrics_tables
 
     if json:
         typer.echo(evaluation.to_json(), nl=False)
     else:
         # A pipe or a log has no width of its own; the table should not be squeezed into 80 columns there.
         console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
-        console.print(metrics_table(evaluation))
+        for table in metrics_tables(evaluation):
+            console.print(table)
+    for note in evaluation.notes:
+        messages.print(f"note: {note}", markup=False, soft_wrap=True)
 
 
 Threads = Annotated[

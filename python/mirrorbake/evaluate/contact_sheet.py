@@ -11,10 +11,13 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from mirrorbake.evaluate.contenders import TITLES, render_contenders
-from mirrorbake.evaluate.metrics import OBJECT_COVERAGE, display_referred, psnr
+from mirrorbake.errors import InputError
+from mirrorbake.evaluate.contenders import RUN_TIMES, TITLES
+from mirrorbake.evaluate.evaluate import Onlooker
+from mirrorbake.evaluate.metrics import display_referred
+from mirrorbake.evaluate.places import choose_views
 from mirrorbake.files import atomic_output
-from mirrorbake.pem.view_images import images_of_trace
+from mirrorbake.pem.view_images import ViewImages
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,8 +26,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.evaluate.evaluate import SeenView
+    from mirrorbake.evaluate.references import Window
     from mirrorbake.pem.opened import OpenedPem
-    from mirrorbake.pem.view_images import ViewImages
 
 ERROR_RANGE = 0.25
 """Display-referred error at which the colour scale of the error images ends."""
@@ -41,6 +45,10 @@ COLUMN_TITLE = 0.26
 ROW_SPACE = 0.14
 
 
+SHEET_CONTENDERS = ("pem", "static_infinite", "static_proxy")
+"""Those that there is room for."""
+
+
 @dataclass(frozen=True)
 class _View:
     title: str
@@ -48,62 +56,68 @@ class _View:
     images: ViewImages
     pictures: dict[str, FloatArray]
     """Radiance of the object by contender."""
+    decibels: dict[str, float | None]
 
 
 def contact_sheet(pem: OpenedPem, path: Path) -> None:
     """Write a PNG that compares ray tracing, the PEM and the static maps.
 
-    It shows a sampled view from the middle of the arc, and the view half-way to the next one. Errors are the
-    mean over R, G, B of the absolute difference of what a display shows.
+    It shows a sampled view from the middle of the arc, and the view half-way to the next one, both against
+    references of an evaluation. Errors are the mean over R, G, B of the absolute difference of what a display
+    shows.
+
+    Raises
+    ------
+    InputError
+        The object covers no pixel of those views, or the file cannot be written.
     """
-    middle = (len(pem.parameters) - 1) // 2
-    views = [_sampled_view(pem, middle)]
-    if len(pem.parameters) > 1:
-        views.append(_view_between(pem, middle))
+    arc, middle = pem.stage.built.arc, (len(pem.parameters) - 1) // 2
+    views = choose_views(arc, pem.parameters, every=True)
+    # On a sample and between two take turns.
+    near = [view for view in views[2 * middle : 2 * middle + 2] if view.place in ("on", "between")]
+    onlooker = Onlooker(pem)
+    seen = [onlooker.look(view) for view in near]
+    there = [one for one in seen if one is not None]
+    if not there:
+        raise InputError(f"{path}: cannot draw: the object covers no pixel of the view in the middle")
+    window = _common([one.reference.window for one in there])
+    shown = [_view(one, window) for one in there]
     with mpl.rc_context({"font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9}):
-        figure = _draw(views)
+        figure = _draw(shown)
         with atomic_output(path) as temporary:
             figure.savefig(temporary, dpi=150, facecolor="white")
 
 
-def _sampled_view(pem: OpenedPem, index: int) -> _View:
-    t = pem.parameters[index]
+def _view(seen: SeenView, window: Window) -> _View:
+    view, reference = seen.view, seen.reference
+    part = _inside(window, reference.window)
+    images = reference.images
+    if view.place == "on":
+        title, note = "On a sampled view", f"t = {view.t:.3f}: the maps were inferred from this view"
+    else:
+        title = "Half-way between two samples"
+        note = f"t = {view.t:.3f}: {view.degrees:.3g}° from both, their maps blended"
+    run_time = RUN_TIMES[0]
+    chosen = [name for name in SHEET_CONTENDERS if name in seen.pictures]
     return _View(
-        title="On a sampled view",
-        note=f"t = {t:.3f}: the maps were inferred from this view",
-        images=pem.store.read_images(index),
-        pictures=render_contenders(pem, t, pem.stage.visibility(t)),
+        title=title,
+        note=f"{note}; reference of {reference.samples} samples, ceiling {reference.ceiling:.1f} dB",
+        images=ViewImages(images.object[part], images.coverage[part], images.background[part]),
+        pictures={name: seen.pictures[name][run_time][part] for name in chosen},
+        decibels={name: reference.psnr(seen.pictures[name][run_time]) for name in chosen},
     )
 
 
-def _view_between(pem: OpenedPem, index: int) -> _View:
-    t = 0.5 * (pem.parameters[index] + pem.parameters[index + 1])
-    trace = pem.stage.trace(t)
-    away = 0.5 * abs(pem.stage.config.views.degrees) / (len(pem.parameters) - 1)
-    return _View(
-        title="Half-way between two samples",
-        note=f"t = {t:.3f}: {away:.3g}° from both, their maps blended",
-        images=images_of_trace(trace),
-        pictures=render_contenders(pem, t, trace.samples),
-    )
+def _common(windows: list[Window]) -> Window:
+    """What all windows share: views this near to each other show the object in nearly the same place."""
+    left, top = (max(window[axis] for window in windows) for axis in (0, 1))
+    right, bottom = (min(window[axis] + window[axis + 2] for window in windows) for axis in (0, 1))
+    return (left, top, max(right - left, 1), max(bottom - top, 1))
 
 
-def _crop(views: list[_View]) -> tuple[slice, slice]:
-    """Return the part of the frame around the object, the same for all views."""
-    seen = np.any([view.images.coverage > 0.0 for view in views], axis=0)
-    if not seen.any():
-        return slice(None), slice(None)
-    rows, columns = (np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0))
-    top, bottom = _widen(int(rows[0]), int(rows[-1]) + 1, 0, seen.shape[0])
-    # Pictures that are taller than wide would make the sheet too long to look at.
-    left, right = _widen(int(columns[0]), int(columns[-1]) + 1, bottom - top, seen.shape[1])
-    return slice(top, bottom), slice(left, right)
-
-
-def _widen(first: int, last: int, least: int, limit: int) -> tuple[int, int]:
-    """Add a margin to the pixels [first, last) so that they are at least `least`, within [0, limit)."""
-    margin = max(2, (last - first) // 12, (least - (last - first) + 1) // 2)
-    return max(0, first - margin), min(limit, last + margin)
+def _inside(window: Window, outer: Window) -> tuple[slice, slice]:
+    left, top = window[0] - outer[0], window[1] - outer[1]
+    return slice(top, top + window[3]), slice(left, left + window[2])
 
 
 class _Sheet:
@@ -131,8 +145,7 @@ class _Sheet:
 
 
 def _draw(views: list[_View]) -> Figure:
-    crop = _crop(views)
-    rows, columns = views[0].images.coverage[crop].shape
+    rows, columns = views[0].images.coverage.shape
     cell = CELL * rows / columns
     names = list(views[0].pictures)
     width = 2 * MARGIN + (1 + len(names)) * (CELL + GAP) - GAP
@@ -147,30 +160,30 @@ def _draw(views: list[_View]) -> Figure:
         color="0.35",
     )
     for number, view in enumerate(views):
-        _draw_view(sheet, view, crop, cell, TITLE + number * view_height)
+        _draw_view(sheet, view, cell, TITLE + number * view_height)
     return sheet.figure
 
 
-def _draw_view(sheet: _Sheet, view: _View, crop: tuple[slice, slice], cell: float, top: float) -> None:
+def _draw_view(sheet: _Sheet, view: _View, cell: float, top: float) -> None:
     sheet.text(MARGIN, top + 0.2, view.title, size=11, weight="bold")
     sheet.text(MARGIN + CELL + GAP, top + 0.2, view.note, size=10, color="0.35")
     heading = top + ROW_TITLE + 0.16
     first = top + ROW_TITLE + COLUMN_TITLE
     second = first + cell + GAP
     reference = view.images.beauty
-    mask = view.images.coverage >= OBJECT_COVERAGE
     sheet.text(MARGIN, heading, "Ray traced")
-    sheet.picture(MARGIN, first, cell, display_referred(reference[crop]))
+    sheet.picture(MARGIN, first, cell, display_referred(reference))
     _draw_scale(sheet, second, cell)
     for column, (name, light) in enumerate(view.pictures.items(), start=1):
         left = MARGIN + column * (CELL + GAP)
         picture = view.images.composite(light)
         sheet.text(left, heading, TITLES[name])
-        decibels = f"{psnr(light, view.images.object, mask):.1f} dB" if mask.any() else ""
+        value = view.decibels[name]
+        decibels = "" if value is None else f"{value:.1f} dB"
         sheet.text(left + CELL, heading, decibels, ha="right", weight="bold")
-        sheet.picture(left, first, cell, display_referred(picture[crop]))
+        sheet.picture(left, first, cell, display_referred(picture))
         error = np.abs(display_referred(picture) - display_referred(reference)).mean(axis=-1)
-        sheet.picture(left, second, cell, error[crop], cmap=ERROR_COLOURS, vmin=0.0, vmax=ERROR_RANGE)
+        sheet.picture(left, second, cell, error, cmap=ERROR_COLOURS, vmin=0.0, vmax=ERROR_RANGE)
 
 
 def _draw_scale(sheet: _Sheet, top: float, cell: float) -> None:

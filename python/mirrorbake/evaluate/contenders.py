@@ -1,26 +1,153 @@
-"""What an evaluation compares with ray tracing."""
+"""What an evaluation compares with ray tracing: one interface, and everything that implements it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.evaluate.references import options_of
+
 if TYPE_CHECKING:
-    from mirrorbake import _core
+    from collections.abc import Callable, Mapping
+
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.evaluate.places import View
+    from mirrorbake.evaluate.references import Window
     from mirrorbake.pem.opened import OpenedPem
 
-CONTENDERS = ("pem", "static_infinite", "static_proxy")
-"""What an evaluation compares with ray tracing, in the order of its tables."""
+RUN_TIMES = ("reference",)
+"""How contenders are drawn, in the order of the tables.
 
-TITLES = {
+`reference` takes as many lookups per pixel as the PEM's targets have samples, each of a quarter of a pixel
+(`infer.footprint_scale`).
+"""
+
+
+@dataclass
+class Frame:
+    """A view to be drawn from maps."""
+
+    pem: OpenedPem
+    view: View
+    window: Window
+    """x, y, width and height of the part that is drawn, pixels."""
+    _samples: dict[str, _core.SurfaceSamples] = field(default_factory=dict)
+
+    def samples(self, run_time: str) -> _core.SurfaceSamples:
+        """Where a run time's lookups see the reflector, by one of `RUN_TIMES`."""
+        if run_time not in self._samples:
+            stage = self.pem.stage
+            options = options_of(stage, stage.options.samples_per_pixel, stage.config.trace.seed, self.window)
+            self._samples[run_time] = stage.tracer.trace_visibility(
+                self.view.camera, stage.built.reflector, options
+            )
+        return self._samples[run_time]
+
+
+@dataclass(frozen=True)
+class Contender:
+    """Something that draws the reflector without ray tracing."""
+
+    title: str
+    """How tables and pictures call it."""
+    render: Callable[[Frame, str], FloatArray]
+    """Radiance (H, W, 3) of the reflector in a frame's window, drawn as one of `RUN_TIMES`."""
+
+
+TITLES: Mapping[str, str] = {
     "pem": "PEM",
+    "pem_nearest": "PEM, nearest sample",
+    "pem_single_infinite": "PEM, one layer at infinity",
     "static_infinite": "Static map at infinity",
     "static_proxy": "Static map on the PEM's geometry",
 }
-"""How tables and pictures call the contenders."""
+"""All contenders there are, in the order of the tables, and how those call them."""
+
+CONTENDERS = tuple(TITLES)
 
 
-def render_contenders(pem: OpenedPem, t: float, samples: _core.SurfaceSamples) -> dict[str, FloatArray]:
-    """Draw the reflector with every contender that exists: radiance (H, W, 3) by name."""
-    names = [name for name in CONTENDERS if name != "static_proxy" or pem.run_time.has_static_proxy]
-    return {name: pem.run_time.render(name, t, samples) for name in names}
+def contenders_of(pem: OpenedPem) -> dict[str, Contender]:
+    """Return the contenders that a PEM has, by name: all of `CONTENDERS` that make sense for it.
+
+    A static map on the PEM's geometry is none of its own if that is infinite, and the nearest sample is what
+    is drawn anyway if there is just one.
+    """
+
+    def stored(name: str) -> Callable[[Frame, str], FloatArray]:
+        return lambda frame, run_time: pem.run_time.render(name, frame.view.t, frame.samples(run_time))
+
+    found = {"pem": stored("pem")}
+    if len(pem.parameters) > 1:
+        found["pem_nearest"] = lambda frame, run_time: pem.run_time.render(
+            "pem", nearest_parameter(pem, frame.view.t), frame.samples(run_time)
+        )
+    found["pem_single_infinite"] = SingleLayer(pem).render
+    found["static_infinite"] = stored("static_infinite")
+    if pem.run_time.has_static_proxy:
+        found["static_proxy"] = stored("static_proxy")
+    return {name: Contender(TITLES[name], render) for name, render in found.items()}
+
+
+def nearest_parameter(pem: OpenedPem, t: float) -> float:
+    """Parameter of the sampled view nearest to t; of two, the first."""
+    return min(pem.parameters, key=lambda parameter: abs(parameter - t))
+
+
+class SingleLayer:
+    """Maps of one layer on a sphere at infinity, inferred as those of [PEM] figure 6.
+
+    They are inferred from the views of the PEM, with its solver's settings, when they are first drawn: one
+    map per part, which holds all that the part reflects.
+    """
+
+    def __init__(self, pem: OpenedPem) -> None:
+        self._pem = pem
+        header = pem.store.header
+        self._layout = _core.CubePyramidLayout(header.map_size)
+        self._proxy = _core.Proxy.infinite(header.static["infinite"]["origin"])
+        infer = pem.stage.config.infer
+        self._lookup = _core.LookupOptions(footprint_scale=infer.footprint_scale)
+        self._solve = _core.SolveOptions(
+            smoothness=infer.smoothness,
+            level_agreement=infer.level_agreement,
+            prior_weight=infer.prior_weight,
+            tolerance=infer.tolerance,
+            max_iterations=infer.iterations,
+        )
+        self._capture = _core.build_cube_pyramid(pem.store.read_capture())
+        self._maps: dict[int, list[FloatArray]] = {}
+
+    def render(self, frame: Frame, run_time: str) -> FloatArray:
+        """Draw the reflector: radiance (H, W, 3). Between two samples their maps are blended, as a PEM's."""
+        first, second, weight = self._pem.run_time.neighbours(frame.view.t)
+        self._maps = {i: self._maps.get(i) or self._infer(i) for i in {first, second}}
+        maps = [
+            a if weight == 0.0 else np.float32(1.0 - weight) * a + np.float32(weight) * b
+            for a, b in zip(self._maps[first], self._maps[second], strict=True)
+        ]
+        parts = [_core.PartMaps(self._proxy, texels) for texels in maps]
+        return self._pem.run_time.render_parts(parts, frame.samples(run_time))
+
+    def _infer(self, index: int) -> list[FloatArray]:
+        stage, header = self._pem.stage, self._pem.store.header
+        samples = stage.trace(header.parameters[index]).samples
+        incident = np.zeros((len(samples), 3), np.float32)
+        through = np.ones((len(samples), 1), np.float32)
+        for shell in samples.shells:
+            radiance = np.asarray(shell.radiance)
+            incident += through * radiance[:, :3]
+            through *= 1.0 - radiance[:, 3:]
+        maps = []
+        for part in range(len(header.parts)):
+            matrix = _core.build_rendering_matrix(samples, part, self._proxy, self._layout, self._lookup)
+            if matrix.rows == 0:
+                maps.append(np.asarray(self._capture))
+                continue
+            target = matrix.average(samples, part, incident)
+            weights = _core.display_row_weights(matrix, stage.options.samples_per_pixel, target)
+            solver = _core.MapSolver(matrix, weights, self._layout, self._solve)
+            maps.append(np.asarray(solver.solve(target, self._capture, self._capture)[0]))
+        return maps

@@ -1,151 +1,308 @@
-"""How well a PEM does: against ray tracing, on the sampled views and half-way between them."""
+"""How well a PEM does: against independent ray tracing, on the sampled views, between them and off them."""
 
 from __future__ import annotations
 
 import json
 import math
-import time
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from mirrorbake.evaluate.contenders import CONTENDERS, render_contenders
-from mirrorbake.evaluate.metrics import DISPLAY_TRANSFORM, OBJECT_COVERAGE, mean_or_none, psnr
+import numpy as np
+
+from mirrorbake.errors import InputError
+from mirrorbake.evaluate.contenders import CONTENDERS, RUN_TIMES, Frame, contenders_of
+from mirrorbake.evaluate.metrics import DISPLAY_TRANSFORM, flip, mean_or_none, sliding, ssim, worst_error
+from mirrorbake.evaluate.places import PLACES, View, choose_views
+from mirrorbake.evaluate.references import (
+    MARGIN_DECIBELS,
+    REFERENCES_NAME,
+    Reference,
+    ReferenceCache,
+    object_window,
+    refined_reference,
+)
 from mirrorbake.files import write_text
 from mirrorbake.pem.opened import OpenedPem, open_pem
-from mirrorbake.pem.store import PemStore, Timings
-from mirrorbake.pem.view_images import ViewImages, images_of_trace
+from mirrorbake.pem.store import PemStore
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mirrorbake import _core
+    from numpy.typing import NDArray
+
+    from mirrorbake.arrays import FloatArray
     from mirrorbake.bake.bake import ProgressReport
+    from mirrorbake.evaluate.contenders import Contender
     from mirrorbake.scene.stage import Stage
 
 METRICS_NAME = "metrics.json"
 
+METRICS = ("psnr", "ssim", "flip", "worst", "sliding")
+"""PSNR in dB, SSIM, FLIP, the RMS error of the worst 1 % of the pixels, and the error of the motion since the
+view before, in pixels, where that is a neighbour."""
+
+Figures: TypeAlias = dict[str, dict[str, float | None]]
+"""By contender, by run time. None: it does not exist there, or the reference's noise hides it."""
+
 
 @dataclass(frozen=True)
-class ViewMetrics:
-    """One line of an evaluation."""
+class ViewFigures:
+    """Figures of one view."""
 
+    place: str
+    degrees: float
+    """From the nearest sampled view, as seen from the object."""
     t: float
-    sampled: bool
-    """Whether the PEM has maps of just this view."""
-    trace_s: float
-    build_s: float | None
-    """None half-way between samples, where nothing is built or solved."""
-    solve_s: float | None
-    psnr: dict[str, float | None]
-    """dB per contender; None where it does not exist, or the object covers no pixel."""
+    """Parameter of the PEM that was drawn."""
+    ceiling: float
+    """PSNR in dB that the true image would have against this view's reference: its noise."""
+    samples: int
+    """Per pixel of the reference."""
+    seconds: float
+    """That tracing the reference took, now or when it was put into the cache."""
+    metrics: dict[str, Figures]
+    """By one of `METRICS`."""
+
+    @property
+    def margin(self) -> float:
+        """DB between the best contender's PSNR and the ceiling; infinite if there is neither."""
+        best = [v for row in self.metrics["psnr"].values() for v in row.values() if v is not None]
+        return self.ceiling - max(best) if best and math.isfinite(self.ceiling) else math.inf
 
 
 @dataclass(frozen=True)
 class Evaluation:
     """Figures of a whole PEM."""
 
-    views: list[ViewMetrics]
+    views: list[ViewFigures]
     header: dict[str, Any]
+    notes: list[str] = field(default_factory=list)
+    """What the user should know about the figures."""
+    written: bool = False
+    """Whether they are in metrics.json."""
 
-    def mean_psnr(self, contender: str, *, sampled: bool) -> float | None:
-        """Mean PSNR in dB over the sampled views or those between them; None if there are none."""
-        return mean_or_none([view.psnr[contender] for view in self.views if view.sampled == sampled])
+    def mean(
+        self, contender: str, place: str, *, run_time: str = RUN_TIMES[0], metric: str = "psnr"
+    ) -> float | None:
+        """Mean of a metric over the views of a place (PSNR: of the dB); None if there are none."""
+        return mean_or_none(
+            [
+                view.metrics[metric].get(contender, {}).get(run_time)
+                for view in self.views
+                if view.place == place
+            ]
+        )
+
+    @property
+    def places(self) -> list[str]:
+        """Those that there are views of, in the order of the tables."""
+        return [place for place in PLACES if any(view.place == place for view in self.views)]
 
     def to_json(self) -> str:
         """Return the text of metrics.json. PSNR of equal images is null: infinity is not JSON."""
         summary = {
-            name: {contender: _finite(self.mean_psnr(contender, sampled=sampled)) for contender in CONTENDERS}
-            for name, sampled in (("sampled", True), ("between", False))
+            contender: {
+                run_time: {
+                    place: _finite(self.mean(contender, place, run_time=run_time)) for place in self.places
+                }
+                for run_time in RUN_TIMES
+            }
+            for contender in CONTENDERS
         }
         views = [
             {
+                "place": view.place,
+                "degrees": view.degrees,
                 "t": view.t,
-                "sampled": view.sampled,
-                "trace_s": view.trace_s,
-                "build_s": view.build_s,
-                "solve_s": view.solve_s,
-                "psnr": {name: _finite(value) for name, value in view.psnr.items()},
+                "ceiling": _finite(view.ceiling),
+                "reference_samples": view.samples,
+                "reference_s": view.seconds,
+                **{
+                    metric: {
+                        contender: {run_time: _finite(value) for run_time, value in row.items()}
+                        for contender, row in figures.items()
+                    }
+                    for metric, figures in view.metrics.items()
+                },
             }
             for view in self.views
         ]
-        return json.dumps({"views": views, "mean_psnr": summary, **self.header}, indent=1) + "\n"
+        content = {"views": views, "summary": summary, "notes": self.notes, **self.header}
+        return json.dumps(content, indent=1) + "\n"
 
 
 def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def evaluate(
-    directory: Path, progress: ProgressReport | None = None, stage: Stage | None = None
-) -> Evaluation:
-    """Compare a PEM with ray tracing and write metrics.json into its folder.
+@dataclass(frozen=True)
+class SeenView:
+    """A view with its reference and what the contenders make of it."""
 
-    The sampled views are compared with the ray tracing they were baked from, those half-way between with a
-    new one.
+    view: View
+    reference: Reference
+    pictures: dict[str, dict[str, FloatArray]]
+    """Radiance (H, W, 3) of the object in the reference's window, by contender and run time."""
+
+
+class Onlooker:
+    """Looks at a PEM from any view: reference and contenders."""
+
+    def __init__(self, pem: OpenedPem) -> None:
+        self.pem = pem
+        self.cache = ReferenceCache(
+            pem.store.directory / REFERENCES_NAME, pem.store.header.source, pem.store.header.plan.depth
+        )
+        self.contenders: dict[str, Contender] = contenders_of(pem)
+
+    def look(self, view: View) -> SeenView | None:
+        """Return a view with a reference that is good enough for it; None if the object is not in it."""
+        window = object_window(self.pem.stage, view.camera)
+        if window[2] == 0:
+            return None
+        frame = Frame(self.pem, view, window)
+        pictures = {
+            name: {run_time: contender.render(frame, run_time) for run_time in RUN_TIMES}
+            for name, contender in self.contenders.items()
+        }
+        images = [image for row in pictures.values() for image in row.values()]
+
+        def best_error(reference: Reference) -> float | None:
+            errors = [reference.error(image) for image in images]
+            return None if None in errors else min(error for error in errors if error is not None)
+
+        reference = refined_reference(self.pem.stage, view.camera, window, self.cache, best_error)
+        return SeenView(view, reference, pictures) if reference.mask.any() else None
+
+
+def evaluate(
+    directory: Path,
+    progress: ProgressReport | None = None,
+    stage: Stage | None = None,
+    *,
+    every_view: bool = False,
+) -> Evaluation:
+    """Compare a PEM with independent ray tracing and write metrics.json into its folder.
+
+    References are traced with other random numbers than the PEM's targets, with as many samples as bring
+    their noise 6 dB below the smallest error that is measured, and kept in `DIR/references`.
 
     Parameters
     ----------
     directory
-        Holds a complete PEM.
+        Holds a complete PEM. If it cannot be written to, the figures are returned all the same.
     progress
         Told about every view.
     stage
         The PEM's scene, if it has been prepared already.
+    every_view
+        Look at every sample and between every two, not at a selection (`choose_views`).
+
+    Raises
+    ------
+    StoreError
+        As `open_pem` raises it.
     """
     report = progress or (lambda done, total, text: None)
     count = len(PemStore.open(directory).header.parameters)
-    total = 2 * count - 1
-    report(0, total, "preparing the scene")
+    report(0, count, "preparing the scene")
     pem = open_pem(directory, stage)
-    views = []
-    for step in range(total):
-        index, between = divmod(step, 2)
-        if between:
-            t = 0.5 * (pem.parameters[index] + pem.parameters[index + 1])
-            report(step, total, f"tracing t = {t:.4f}")
-            views.append(_evaluate_between(pem, t))
+    onlooker = Onlooker(pem)
+    views = choose_views(pem.stage.built.arc, pem.parameters, every=every_view)
+    figures: list[ViewFigures] = []
+    unseen = []
+    before: SeenView | None = None
+    for step, view in enumerate(views):
+        report(step, len(views), f"{view.place}, {view.degrees:.3g}° from a sample")
+        seen = onlooker.look(view)
+        if seen is None:
+            unseen.append(view.place)
         else:
-            report(step, total, f"view {index + 1} of {count}")
-            views.append(_evaluate_sampled(pem, index))
-    report(total, total, f"{total} views")
+            figures.append(_figures(seen, before if view.place == "between" else None))
+        before = seen
+    report(len(views), len(views), f"{len(views)} views")
+    notes = _notes(figures, unseen, onlooker.cache)
     source = pem.store.header.source
     evaluation = Evaluation(
-        views,
+        figures,
         {
             "library": source.library,
             "display_transform": DISPLAY_TRANSFORM,
-            "object_coverage": OBJECT_COVERAGE,
+            "mask": "pixels that the object covers wholly",
             "config": source.config,
             "plan": pem.store.header.plan.to_json(),
             "inputs": source.inputs,
         },
+        notes,
     )
-    write_text(directory / METRICS_NAME, evaluation.to_json())
-    return evaluation
+    try:
+        write_text(directory / METRICS_NAME, evaluation.to_json())
+    except InputError as failure:
+        notes.append(str(failure))
+        return evaluation
+    return replace(evaluation, written=True)
 
 
-def _evaluate_sampled(pem: OpenedPem, index: int) -> ViewMetrics:
-    t = pem.parameters[index]
-    timings: Timings = pem.store.read_timings(index)
-    values = compare(pem, t, pem.stage.visibility(t), pem.store.read_images(index))
-    return ViewMetrics(t, True, timings.trace_s, timings.build_s, timings.solve_s, values)
+def _notes(figures: list[ViewFigures], unseen: list[str], cache: ReferenceCache) -> list[str]:
+    notes = []
+    if unseen:
+        notes.append(f"no pixel is wholly the object's from: {', '.join(dict.fromkeys(unseen))}")
+    noisy = [view.place for view in figures if view.margin < MARGIN_DECIBELS - 0.05]
+    if noisy:
+        notes.append(
+            f"the reference has less than {MARGIN_DECIBELS:g} dB to spare, for all its samples: "
+            + ", ".join(dict.fromkeys(noisy))
+        )
+    if cache.problem is not None:
+        notes.append(f"references are not kept: {cache.problem}")
+    return notes
 
 
-def _evaluate_between(pem: OpenedPem, t: float) -> ViewMetrics:
-    start = time.perf_counter()
-    trace = pem.stage.trace(t)
-    trace_s = time.perf_counter() - start
-    values = compare(pem, t, trace.samples, images_of_trace(trace))
-    return ViewMetrics(t, False, trace_s, None, None, values)
+def _figures(seen: SeenView, before: SeenView | None) -> ViewFigures:
+    reference = seen.reference
+    whole, mask = reference.images.beauty, reference.mask
+    metrics: dict[str, Figures] = {metric: {} for metric in METRICS}
+    for contender, row in seen.pictures.items():
+        for metric in METRICS:
+            metrics[metric][contender] = {}
+        for run_time, light in row.items():
+            picture = reference.images.composite(light)
+            values = {
+                "psnr": reference.psnr(light),
+                "ssim": ssim(picture, whole, mask),
+                "flip": flip(picture, whole, mask),
+                "worst": worst_error(light, reference.images.object, mask),
+                "sliding": _sliding(seen, before, contender, run_time),
+            }
+            for metric, value in values.items():
+                metrics[metric][contender][run_time] = value
+    view = seen.view
+    return ViewFigures(
+        view.place, view.degrees, view.t, reference.ceiling, reference.samples, reference.seconds, metrics
+    )
 
 
-def compare(
-    pem: OpenedPem, t: float, samples: _core.SurfaceSamples, images: ViewImages
-) -> dict[str, float | None]:
-    """PSNR in dB of every contender on the object's pixels; None for what does not exist."""
-    mask = images.coverage >= OBJECT_COVERAGE
-    values: dict[str, float | None] = dict.fromkeys(CONTENDERS)
-    if mask.any():
-        for name, image in render_contenders(pem, t, samples).items():
-            values[name] = psnr(image, images.object, mask)
-    return values
+def _sliding(seen: SeenView, before: SeenView | None, contender: str, run_time: str) -> float | None:
+    if before is None:
+        return None
+    windows = (before.reference.window, seen.reference.window)
+    left, top = (min(window[axis] for window in windows) for axis in (0, 1))
+    width, height = (max(window[axis] + window[axis + 2] for window in windows) for axis in (0, 1))
+    shape = (height - top, width - left)
+
+    def placed(image: NDArray[np.generic], window: tuple[int, int, int, int]) -> FloatArray:
+        return _placed(image, window[0] - left, window[1] - top, shape)
+
+    masks = [placed(s.reference.mask, s.reference.window) > 0 for s in (before, seen)]
+    true = [placed(s.reference.images.beauty, s.reference.window) for s in (before, seen)]
+    drawn = [
+        placed(s.reference.images.composite(s.pictures[contender][run_time]), s.reference.window)
+        for s in (before, seen)
+    ]
+    return sliding((drawn[0], drawn[1]), (true[0], true[1]), masks[0] & masks[1])
+
+
+def _placed(image: NDArray[np.generic], left: int, top: int, shape: tuple[int, int]) -> FloatArray:
+    canvas = np.zeros((*shape, *image.shape[2:]), np.float32)
+    canvas[top : top + image.shape[0], left : left + image.shape[1]] = image
+    return canvas

@@ -1,4 +1,4 @@
-"""The table of an evaluation, for a terminal."""
+"""The tables of an evaluation, for a terminal."""
 
 from __future__ import annotations
 
@@ -6,46 +6,75 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from mirrorbake.evaluate.contenders import CONTENDERS, TITLES
+from mirrorbake.evaluate.contenders import CONTENDERS, RUN_TIMES, TITLES
+from mirrorbake.evaluate.metrics import mean_or_none
+from mirrorbake.evaluate.places import PLACE_TITLES
 
 if TYPE_CHECKING:
-    from mirrorbake.evaluate.evaluate import Evaluation, ViewMetrics
+    from mirrorbake.evaluate.evaluate import Evaluation
 
-MAX_TABLE_ROWS = 24
-"""A longer evaluation is thinned out in the table; metrics.json has every view."""
+METRIC_TITLES = {
+    "psnr": "PSNR dB",
+    "ssim": "SSIM",
+    "flip": "FLIP",
+    "worst": "worst 1 %",
+    "sliding": "sliding px",
+}
+_DIGITS = {"psnr": 2, "ssim": 4, "flip": 4, "worst": 3, "sliding": 2}
 
 
-def _number(value: float | None, digits: int) -> str:
+def number(value: float | None, digits: int) -> str:
+    """Words for a figure; a dash for none."""
     return "–" if value is None else f"{value:.{digits}f}"
 
 
-def metrics_table(evaluation: Evaluation) -> Table:
-    """Return the table of an evaluation for a terminal."""
-    table = Table(title="PSNR on the object, dB (display-referred)", title_justify="left")
-    table.add_column("view t", justify="right", no_wrap=True)
-    table.add_column("sampled", justify="center")
-    for heading in ("trace s", "build s", "solve s", *(TITLES[name] for name in CONTENDERS)):
-        table.add_column(heading, justify="right")
-    stride = -(-len(evaluation.views) // MAX_TABLE_ROWS)
-    # An odd stride keeps both sampled views and those between them.
-    stride += stride % 2 == 0
-    for view in evaluation.views[::stride]:
-        table.add_row(*_row(view))
-    table.add_section()
-    for name, sampled in (("mean on samples", True), ("mean half-way", False)):
-        chosen = [view for view in evaluation.views if view.sampled == sampled]
-        if chosen:
-            means = (evaluation.mean_psnr(contender, sampled=sampled) for contender in CONTENDERS)
-            table.add_row(name, "", "", "", "", *(_number(value, 2) for value in means), style="bold")
-    return table
-
-
-def _row(view: ViewMetrics) -> list[str]:
+def present(evaluation: Evaluation) -> list[str]:
+    """Contenders that have a figure somewhere."""
     return [
-        f"{view.t:.4f}",
-        "yes" if view.sampled else "",
-        _number(view.trace_s, 2),
-        _number(view.build_s, 2),
-        _number(view.solve_s, 2),
-        *(_number(view.psnr[name], 2) for name in CONTENDERS),
+        name
+        for name in CONTENDERS
+        if any(
+            value is not None
+            for view in evaluation.views
+            for value in view.metrics["psnr"].get(name, {}).values()
+        )
     ]
+
+
+def metrics_tables(evaluation: Evaluation) -> list[Table]:
+    """Return the tables of an evaluation: PSNR of every contender by place, and all metrics of the PEM."""
+    names = present(evaluation)
+    tables = []
+    for run_time in RUN_TIMES:
+        table = Table(
+            title=f"PSNR in dB on the object, as a display shows it; run time {run_time}",
+            title_justify="left",
+        )
+        for heading in ("place", "views", "degrees", "ceiling"):
+            table.add_column(heading, justify="left" if heading == "place" else "right", no_wrap=True)
+        for name in names:
+            table.add_column(TITLES[name], justify="right")
+        for place in evaluation.places:
+            views = [view for view in evaluation.views if view.place == place]
+            table.add_row(
+                PLACE_TITLES[place],
+                str(len(views)),
+                f"{max(view.degrees for view in views):.3g}",
+                number(mean_or_none([view.ceiling for view in views]), 1),
+                *(number(evaluation.mean(name, place, run_time=run_time), 2) for name in names),
+            )
+        tables.append(table)
+    table = Table(title="The PEM by every metric", title_justify="left")
+    table.add_column("place", no_wrap=True)
+    table.add_column("run time")
+    for title in METRIC_TITLES.values():
+        table.add_column(title, justify="right")
+    for place in evaluation.places:
+        for run_time in RUN_TIMES:
+            values = (
+                number(evaluation.mean("pem", place, run_time=run_time, metric=metric), _DIGITS[metric])
+                for metric in METRIC_TITLES
+            )
+            table.add_row(PLACE_TITLES[place], run_time, *values)
+    tables.append(table)
+    return tables

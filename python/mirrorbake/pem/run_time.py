@@ -71,7 +71,7 @@ class RunTime:
         Parameters
         ----------
         contender
-            One of `CONTENDERS`.
+            `pem`, `static_infinite` or `static_proxy`.
         t
             Parameter in [0,1]; between two views the PEM blends their maps linearly.
         samples
@@ -86,6 +86,10 @@ class RunTime:
             parts = self._pem_parts(*self.neighbours(t))
         else:
             parts = self._static_parts("infinite" if contender == "static_infinite" else "proxy")
+        return self.render_parts(parts, samples)
+
+    def render_parts(self, parts: list[_core.PartMaps], samples: _core.SurfaceSamples) -> FloatArray:
+        """Draw the reflector from maps of each part, with the PEM's diffuse layer; returns as `render`."""
         diffuse = None
         if self._irradiance is not None:
             diffuse = _core.diffuse_from_irradiance(samples, self.triangles, self._irradiance)

@@ -12,5 +12,5 @@ configure_package_config_file(cpp/cmake/mirrorbakeConfig.cmake.in ${CMAKE_CURREN
                               INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/mirrorbakeConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/mirrorbakeConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/mirrorbakeConfigVersion.cmake
-              cpp/cmake/MirrorbakeEmbree.cmake
+              cpp/cmake/MirrorbakeCodecs.cmake cpp/cmake/MirrorbakeEmbree.cmake
         DESTINATION ${package_dir} COMPONENT development)

@@ -1,10 +1,11 @@
-"""Output files that appear complete or not at all."""
+"""Input files that are what they seem, output files that appear complete or not at all."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import os
+import stat
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,6 +40,37 @@ def atomic_output(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def read_text(path: Path, *, at_most: int) -> str:
+    """Read a text file in UTF-8, with or without a byte-order mark.
+
+    Parameters
+    ----------
+    path
+        A regular file: pipes and devices, which may never end, are refused.
+    at_most
+        Bytes that the file may have.
+
+    Raises
+    ------
+    InputError
+        The file is missing, not a regular one, too long, cannot be read or is not UTF-8.
+    """
+    try:
+        # Without waiting for the writer of a pipe.
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        with os.fdopen(handle, "rb") as file:
+            status = os.fstat(handle)
+            if not stat.S_ISREG(status.st_mode):
+                raise InputError(f"{path}: is not a regular file")
+            if status.st_size > at_most:
+                raise InputError(f"{path}: {status.st_size} bytes; expected a text of at most {at_most}")
+            return file.read(at_most).decode("utf-8-sig")
+    except OSError as failure:
+        raise InputError(f"{path}: {failure.strerror or failure}") from None
+    except UnicodeDecodeError as failure:
+        raise InputError(f"{path}: not UTF-8 text (byte {failure.start})") from None
 
 
 def write_text(path: Path, text: str) -> None:

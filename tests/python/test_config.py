@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+import os
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,9 +11,6 @@ from mirrorbake.errors import InputError
 from mirrorbake.scene.config import PATH_KEYS, SceneConfig
 from mirrorbake.scene.load import load_config, parse_config, parse_override
 from mirrorbake.scene.plan import DECIDED_KEYS
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def test_an_empty_scene_is_the_teapot_in_its_room_at_the_papers_size() -> None:
@@ -194,6 +193,20 @@ def test_a_file_that_is_not_toml_is_one_clear_error(tmp_path: Path, content: byt
     with pytest.raises(InputError, match=message) as caught:
         load_config(scene)
     assert str(caught.value).startswith(str(scene))
+
+
+def test_a_byte_order_mark_is_no_part_of_a_scene_file(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_bytes(b"\xef\xbb\xbf[views]\ncount = 3\n")
+    assert load_config(scene).views.count == 3
+
+
+def test_a_device_or_a_pipe_is_no_scene_file(tmp_path: Path) -> None:
+    pipe = tmp_path / "scene.toml"
+    os.mkfifo(pipe)
+    for path in (pipe, Path("/dev/zero"), tmp_path):
+        with pytest.raises(InputError, match="is not a regular file"):
+            load_config(path)
 
 
 def test_a_missing_scene_file_is_named(tmp_path: Path) -> None:

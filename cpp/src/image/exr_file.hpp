@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 
@@ -10,10 +9,14 @@
 
 namespace mirrorbake::image_files {
 
-/// Opens the first part of an EXR file, or of one in memory, whose bytes have to outlive the reader. Integer channels
-/// (ids) keep their values. Throws FileError for anything but flat pixels with a value of every channel for every pixel.
-std::unique_ptr<Reader> open_exr(const std::string& name,
-                                 std::optional<std::span<const unsigned char>> memory = std::nullopt);
+/// Opens a part of an EXR file, with its integer channels (ids) as they are and its colours relative to Rec. 709. Channels in
+/// no layer come before those of layers; V-Ray's ".R" is "R". Throws FileError for anything but flat pixels with a value of
+/// every channel for every pixel, or luminance with chroma of half the size.
+std::unique_ptr<Reader> open_exr(const std::string& name, std::shared_ptr<const Bytes> bytes,
+                                 const ImageChoice& choice);
+
+/// Walks the headers and throws FileError if an attribute is longer than the file, before OpenEXR makes room for it.
+void check_exr(const std::string& name, const Bytes& bytes);
 
 /// Writes pixels of height × width × channels.size() to `file`, as scan lines in ZIP blocks; errors name `path`. Halves are
 /// clamped to ±65504; returns how many were. Throws FileError.

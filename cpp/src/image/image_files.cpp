@@ -4,45 +4,22 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <initializer_list>
 
 #include "mirrorbake/core/error.hpp"
-#include "png_check.hpp"
 
 namespace mirrorbake::image_files {
-namespace {
 
-// A JPEG decoder makes up what a truncated file lacks and carries on. Every complete file ends with an
-// end-of-image marker, possibly followed by a few bytes that programs append.
-constexpr std::string_view kEndOfJpeg = "\xff\xd9";
-constexpr std::size_t kJpegTail = 4096;
-
-bool jpeg_is_complete(const std::string& path) {
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  const std::streamoff size = in.tellg();
-  const std::streamoff tail_size = std::min<std::streamoff>(size, kJpegTail);
-  std::string tail(static_cast<std::size_t>(tail_size), '\0');
-  in.seekg(size - tail_size);
-  in.read(tail.data(), tail_size);
-  return in && tail.find(kEndOfJpeg) != std::string::npos;
-}
-
-bool jpeg_is_complete(std::span<const unsigned char> bytes) {
-  const auto tail = bytes.last(std::min(bytes.size(), kJpegTail));
-  return std::search(tail.begin(), tail.end(), kEndOfJpeg.begin(), kEndOfJpeg.end(),
-                     [](auto a, char b) { return a == static_cast<unsigned char>(b); }) != tail.end();
-}
-
-}  // namespace
-
-// Only these five readers ever see a file: OpenImageIO left to itself tries all of its plugins on one it does
-// not recognise.
-FileKind kind_from_head(const std::string& name, std::span<const unsigned char> head) {
-  const auto starts_with = [&](std::initializer_list<int> magic) {
-    return head.size() >= magic.size() && std::equal(magic.begin(), magic.end(), head.begin(),
-                                                     [](int a, unsigned char b) { return a == b; });
+// Only these readers ever see a file: OpenImageIO left to itself tries all of its plugins on one it does not recognise.
+FileKind kind_of(const std::string& name, const Bytes& bytes) {
+  std::array<unsigned char, 12> head{};
+  const std::size_t size = bytes.read(0, head);
+  const auto has = [&](std::size_t place, std::initializer_list<int> magic) {
+    return size >= place + magic.size() &&
+           std::equal(magic.begin(), magic.end(), head.begin() + static_cast<std::ptrdiff_t>(place),
+                      [](int a, unsigned char b) { return a == b; });
   };
+  const auto starts_with = [&](std::initializer_list<int> magic) { return has(0, magic); };
   if (starts_with({0x76, 0x2f, 0x31, 0x01})) return FileKind::exr;
   if (starts_with({'#', '?'})) return FileKind::hdr;
   if (starts_with({'I', 'I', 42, 0}) || starts_with({'I', 'I', 43, 0}) || starts_with({'M', 'M', 0, 42}) ||
@@ -51,19 +28,8 @@ FileKind kind_from_head(const std::string& name, std::span<const unsigned char> 
   }
   if (starts_with({0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a})) return FileKind::png;
   if (starts_with({0xff, 0xd8, 0xff})) return FileKind::jpeg;
-  throw FileError(name, "is not an EXR, HDR, TIFF, PNG or JPEG image");
-}
-
-FileKind kind_from_content(const std::string& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) throw FileError(path, "does not exist");
-  if (!std::filesystem::is_regular_file(status)) throw FileError(path, "is not a file");
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw FileError(path, "cannot be read");
-  std::array<unsigned char, 8> head{};
-  in.read(reinterpret_cast<char*>(head.data()), head.size());
-  return kind_from_head(path, head);
+  if (starts_with({'R', 'I', 'F', 'F'}) && has(8, {'W', 'E', 'B', 'P'})) return FileKind::webp;
+  throw FileError(name, "is not an EXR, HDR, TIFF, PNG, JPEG or WebP image");
 }
 
 std::optional<FileKind> known_extension(const std::string& path) {
@@ -83,25 +49,16 @@ FileKind kind_from_extension(const std::string& path) {
   throw FileError(path, "has an unknown extension, expected .exr, .hdr, .tif, .tiff, .png, .jpg or .jpeg");
 }
 
-void check_complete(const std::string& path, FileKind kind) {
-  if (kind == FileKind::jpeg && !jpeg_is_complete(path)) throw FileError(path, "is truncated");
-  if (kind != FileKind::png) return;
-  std::ifstream in(path, std::ios::binary);
-  check_png(path, [&](std::span<unsigned char> to) {
-    in.read(reinterpret_cast<char*>(to.data()), static_cast<std::streamsize>(to.size()));
-    return static_cast<std::size_t>(in.gcount());
-  });
-}
-
-void check_complete(const std::string& name, FileKind kind, std::span<const unsigned char> bytes) {
-  if (kind == FileKind::jpeg && !jpeg_is_complete(bytes)) throw FileError(name, "is truncated");
-  if (kind != FileKind::png) return;
-  check_png(name, [&](std::span<unsigned char> to) {
-    const std::size_t count = std::min(to.size(), bytes.size());
-    std::copy_n(bytes.begin(), count, to.begin());
-    bytes = bytes.subspan(count);
-    return count;
-  });
+Guard guard_of(const std::string& name, FileKind kind, const Bytes& bytes) {
+  switch (kind) {
+    case FileKind::png: return guard_png(name, bytes);
+    case FileKind::jpeg: return guard_jpeg(name, bytes);
+    case FileKind::tiff: return guard_tiff(name, bytes);
+    case FileKind::exr:
+    case FileKind::hdr:
+    case FileKind::webp: break;
+  }
+  return {};
 }
 
 void check_limits(const std::string& path, const Header& header, const ImageLimits& limits) {
@@ -130,7 +87,7 @@ void check_expansion(const std::string& name, const Header& header, std::uint64_
   };
   const std::uint64_t claimed =
       std::max(texels(header.data), header.expands_to_display ? texels(header.display) : 0);
-  if (claimed * header.pixel_bytes / header.expansion > size) {
+  if (claimed * header.pixel_bits / 8 / header.expansion > size) {
     throw FileError(name, "claims " +
                               size_text(header.data.width, header.data.height, header.channel_count()) +
                               ", more than its " + std::to_string(size) + " bytes can hold");

@@ -9,24 +9,24 @@
 #include <string_view>
 #include <vector>
 
+#include "bytes.hpp"
+#include "guard.hpp"
 #include "mirrorbake/image/image_io.hpp"
 
 /// What the readers of image files share: OpenEXR's, which is part of this library, and OpenImageIO's in a library that
 /// is loaded when it is needed. Nothing here knows either.
 namespace mirrorbake::image_files {
 
-enum class FileKind { exr, hdr, tiff, png, jpeg };
+enum class FileKind { exr, hdr, tiff, png, jpeg, webp };
 
-/// Kind by content: the first bytes, of which 8 are enough. Throws FileError, in which `name` stands for the path.
-FileKind kind_from_head(const std::string& name, std::span<const unsigned char> head);
-FileKind kind_from_content(const std::string& path);
-/// Kind by extension, the second throws FileError if it names none.
+/// Kind by content: the first bytes. Throws FileError, in which `name` stands for the path.
+FileKind kind_of(const std::string& name, const Bytes& bytes);
+/// Kind by extension of those that are written, the second throws FileError if it names none.
 std::optional<FileKind> known_extension(const std::string& path);
 FileKind kind_from_extension(const std::string& path);
 
-/// Finds what only looks like a whole file before a decoder sees it. Throws FileError.
-void check_complete(const std::string& path, FileKind kind);
-void check_complete(const std::string& name, FileKind kind, std::span<const unsigned char> bytes);
+/// Finds what only looks like a whole file, and what a decoder must not see, before a decoder sees it. Throws FileError.
+Guard guard_of(const std::string& name, FileKind kind, const Bytes& bytes);
 
 /// Columns [x, x + width) and rows [y, y + height) of the plane that a file's pixels lie in.
 struct Window {
@@ -48,7 +48,8 @@ struct Header {
   bool is_integer = false;
   bool is_byte = false;
   bool says_linear = false;
-  std::size_t pixel_bytes = 0;      ///< of all channels as they are stored
+  std::size_t pixel_bits = 0;       ///< of all channels as they are stored
+  int orientation = 1;              ///< as TIFF numbers it, see Guard
   std::uint64_t expansion = 0;      ///< bytes of pixels that a byte of the file can become, 0: unbounded
   bool expands_to_display = false;  ///< the bound holds for the display window, too
 

@@ -4,19 +4,21 @@
 #include <array>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <memory>
 #include <new>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "exr_file.hpp"
+#include "hdr_file.hpp"
 #include "image_files.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
 #include "mirrorbake/image/color.hpp"
 #include "openimageio.hpp"
+#include "webp_file.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -100,23 +102,47 @@ Image only_alpha(Image image, int alpha) {
   return image;
 }
 
-// Opens an image file by its content, or `memory`, whose path `name` stands for.
-std::unique_ptr<Reader> open(const std::string& name, const ImageLimits& limits,
-                             std::optional<std::span<const unsigned char>> memory = std::nullopt) {
-  const FileKind kind =
-      memory ? image_files::kind_from_head(name, *memory) : image_files::kind_from_content(name);
-  if (memory) {
-    image_files::check_complete(name, kind, *memory);
-  } else {
-    image_files::check_complete(name, kind);
+std::unique_ptr<Reader> open(const std::string& name, FileKind kind,
+                             std::shared_ptr<const image_files::Bytes> bytes, const ImageChoice& choice) {
+  if (kind == FileKind::exr) return image_files::open_exr(name, std::move(bytes), choice);
+  if (!choice.part.empty() || !choice.layer.empty()) {
+    throw FileError(name, "has no parts and layers to choose from, expected an EXR file");
   }
-  std::unique_ptr<Reader> reader = kind == FileKind::exr
-                                       ? image_files::open_exr(name, memory)
-                                       : image_files::openimageio().open(name, kind, memory);
+  if (kind == FileKind::hdr) return image_files::open_hdr(name, std::move(bytes));
+  if (kind == FileKind::webp) return image_files::open_webp(name, std::move(bytes));
+  image_files::Guard guard = image_files::guard_of(name, kind, *bytes);
+  return image_files::openimageio().open(name, kind, std::move(bytes), std::move(guard));
+}
+
+// Opens an image by its content; `name` stands for its path.
+std::unique_ptr<Reader> open(const std::string& name, std::shared_ptr<const image_files::Bytes> bytes,
+                             const ImageLimits& limits, const ImageChoice& choice) {
+  const std::uint64_t size = bytes->size();
+  const FileKind kind = image_files::kind_of(name, *bytes);
+  std::unique_ptr<Reader> reader = open(name, kind, std::move(bytes), choice);
   image_files::check_limits(name, reader->header(), limits);
-  image_files::check_expansion(name, reader->header(),
-                               memory ? memory->size() : std::filesystem::file_size(name));
+  image_files::check_expansion(name, reader->header(), size);
   return reader;
+}
+
+// TIFF 6.0, Orientation: 2 is mirrored left to right, 3 turned by 180 degrees, 4 mirrored top to bottom; 5 to 8 are those
+// with rows and columns exchanged first.
+Image upright(Image image, int orientation) {
+  if (orientation == 1) return image;
+  const bool is_exchanged = orientation >= 5;
+  const bool mirrors_x = orientation == 2 || orientation == 3 || orientation == 6 || orientation == 7;
+  const bool mirrors_y = orientation == 3 || orientation == 4 || orientation == 7 || orientation == 8;
+  Image result(is_exchanged ? image.height : image.width, is_exchanged ? image.width : image.height,
+               image.channels);
+  for (int y = 0; y < result.height; ++y) {
+    for (int x = 0; x < result.width; ++x) {
+      const int across = mirrors_x ? result.width - 1 - x : x;
+      const int down = mirrors_y ? result.height - 1 - y : y;
+      const float* from = is_exchanged ? image.at(down, across) : image.at(across, down);
+      std::copy_n(from, image.channels.size(), result.at(x, y));
+    }
+  }
+  return result;
 }
 
 Image read(Reader& reader, const DecodeOptions& options) {
@@ -132,6 +158,7 @@ Image read(Reader& reader, const DecodeOptions& options) {
     image.width = header.display.width;
     image.height = header.display.height;
   }
+  image = upright(std::move(image), header.orientation);
   if (options.alpha == AlphaUse::drop && header.alpha >= 0 && header.channel_count() > 1) {
     return without_alpha(std::move(image), header.alpha);
   }
@@ -180,6 +207,7 @@ PixelFormat storage_format(const std::string& path, FileKind kind, PixelFormat f
       if (format == PixelFormat::uint8) return PixelFormat::uint8;
       if (format == PixelFormat::uint16) return PixelFormat::uint16;
       return PixelFormat::float32;
+    case FileKind::webp: break;  // is only read
   }
   return format;
 }
@@ -221,21 +249,31 @@ std::vector<std::string> default_channels(int count) {
   }
 }
 
-Image load_image(const std::string& path, const ImageLimits& limits) {
-  return file_errors(path, kDamaged, [&] { return read(*open(path, limits), {limits}); });
+Image load_image(const std::string& path, const ImageLimits& limits, const ImageChoice& choice) {
+  return file_errors(path, kDamaged, [&] {
+    return read(*open(path, image_files::open_bytes(path), limits, choice),
+                {.limits = limits, .choice = choice});
+  });
 }
 
 ImageSize read_image_size(const std::string& path, const ImageLimits& limits) {
   return file_errors(path, kDamaged, [&] {
-    const std::unique_ptr<Reader> reader = open(path, limits);
+    std::shared_ptr<const image_files::Bytes> bytes = image_files::open_bytes(path);
+    const FileKind kind = image_files::kind_of(path, *bytes);
+    const std::unique_ptr<Reader> reader = open(path, std::move(bytes), limits, {});
     const Header& header = reader->header();
-    return ImageSize{header.display.width, header.display.height, header.channel_count()};
+    const bool is_exchanged = header.orientation >= 5;
+    return ImageSize{is_exchanged ? header.display.height : header.display.width,
+                     is_exchanged ? header.display.width : header.display.height, header.channel_count(),
+                     header.orientation == 1 && kind != FileKind::webp && kind != FileKind::hdr};
   });
 }
 
 Image decode_image(const std::string& name, std::span<const unsigned char> bytes,
                    const DecodeOptions& options) {
-  return file_errors(name, kDamaged, [&] { return read(*open(name, options.limits, bytes), options); });
+  return file_errors(name, kDamaged, [&] {
+    return read(*open(name, image_files::bytes_in(bytes), options.limits, options.choice), options);
+  });
 }
 
 bool has_image_extension(const std::string& path) { return image_files::known_extension(path).has_value(); }

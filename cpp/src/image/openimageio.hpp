@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 
@@ -43,8 +42,9 @@ class Texture {
 class OpenImageIo {
  public:
   virtual ~OpenImageIo() = default;
-  virtual std::unique_ptr<Reader> open(const std::string& path, FileKind kind,
-                                       std::optional<std::span<const unsigned char>> memory) const = 0;
+  /// `name` stands for the path in errors.
+  virtual std::unique_ptr<Reader> open(const std::string& name, FileKind kind,
+                                       std::shared_ptr<const Bytes> bytes, Guard guard) const = 0;
   virtual SaveReport save(const SaveRequest& request) const = 0;
   virtual std::unique_ptr<Texture> open_texture(const std::string& path, Transfer transfer,
                                                 const ImageLimits& limits) const = 0;

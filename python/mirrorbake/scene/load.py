@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from mirrorbake.errors import InputError, OptionError
+from mirrorbake.files import read_text
 from mirrorbake.scene.config import PATH_KEYS, SceneConfig
 
 if TYPE_CHECKING:
@@ -90,15 +91,9 @@ def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
+    text = read_text(path, at_most=MAX_SCENE_BYTES)
     try:
-        size = path.stat().st_size
-        if size > MAX_SCENE_BYTES:
-            raise InputError(f"{path}: {size} bytes, a scene file has at most {MAX_SCENE_BYTES}")
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as failure:
-        raise InputError(f"{path}: {failure.strerror or failure}") from None
-    except UnicodeDecodeError as failure:
-        raise InputError(f"{path}: not UTF-8 text (byte {failure.start})") from None
+        return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as failure:
         raise InputError(f"{path}: not valid TOML: {failure}") from None
 

@@ -8,8 +8,8 @@
 
 #include "mirrorbake/image/image.hpp"
 
-/// Image files: EXR through OpenEXR; HDR, TIFF, PNG and JPEG through OpenImageIO, in a library that is loaded when it is
-/// needed first. Neither is seen outside.
+/// Image files: EXR through OpenEXR; WebP through libwebp; HDR by a reader of its own; TIFF, PNG and JPEG, and writing HDR,
+/// through OpenImageIO, in a library that is loaded when it is needed first. None of them is seen outside.
 namespace mirrorbake {
 
 /// Bounds of what a reader accepts: files are hostile until read. They are checked before pixels are
@@ -32,18 +32,32 @@ struct SaveReport {
   std::uint64_t clipped = 0;  ///< values outside [0,1], or below 0 in HDR, or NaN there, that were clipped
 };
 
-/// Reads a file as scene-linear float32. What kind of file it is follows from its first bytes, not from its
+/// Which pixels of an EXR file that has several sets of them. Other files have one, of which both are empty.
+struct ImageChoice {
+  std::string part;  ///< name or number from 0 of a part; empty: the first with colours, or else the first
+  std::string
+      layer;  ///< its channels, without its name and the dot before them; empty: all channels of the part
+};
+
+/// Reads a file as scene-linear float32 of Rec. 709 primaries. What kind of file it is follows from its first bytes, not from its
 /// name. Integer formats are decoded from sRGB unless the file says that it is linear; alpha is left alone,
 /// colour is multiplied by it (premultiplied, as EXR has it). The image is the display window: what a cropped
-/// data window leaves out is 0. Of a file with several images the first is read. Integer channels of EXR (ids) keep their
-/// values. Throws FileError if it is missing, not an image, truncated, beyond `limits`, or an EXR that claims more than its
-/// bytes can hold; HDR, TIFF, PNG and JPEG also if the library that reads them cannot be loaded.
-Image load_image(const std::string& path, const ImageLimits& limits = {});
+/// data window leaves out is 0, and it is upright, whatever order of rows and columns the file states. Of a file with several
+/// images one is read, of EXR the chosen one. EXR's chromaticities, and EXPOSURE and XYZE of HDR, are applied; its integer
+/// channels (ids) keep their values. Channel names are valid UTF-8. Throws FileError if it is missing, not an image, truncated, beyond `limits`, or claims more than its bytes can
+/// hold; TIFF, PNG and JPEG also if the library that reads them cannot be loaded.
+Image load_image(const std::string& path, const ImageLimits& limits = {}, const ImageChoice& choice = {});
+
+/// The colours of an image: what is left of it to shine. Channels R, G, B, or Y alone; of an image with none of its own the
+/// only layer that has them. Depth, alpha and others are left out. Throws FileError(name) if there are none, or several
+/// layers that have them.
+Image colours_of(const std::string& name, Image image);
 
 struct ImageSize {
   int width = 0;   ///< pixels
   int height = 0;  ///< pixels
   int channels = 0;
+  bool is_tileable = true;  ///< TextureFile reads it: upright, and of a format that OpenImageIO reads here
 };
 
 /// Reads what a file's header says. Throws FileError as load_image does, but for damaged pixels.
@@ -58,6 +72,7 @@ enum class AlphaUse { multiply, drop, only };
 
 struct DecodeOptions {
   ImageLimits limits;
+  ImageChoice choice;
   Transfer transfer = Transfer::automatic;
   AlphaUse alpha = AlphaUse::multiply;
 };

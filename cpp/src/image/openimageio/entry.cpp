@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "files.hpp"
 
 namespace mirrorbake::image_files {
@@ -5,9 +7,9 @@ namespace {
 
 class Implementation : public OpenImageIo {
  public:
-  std::unique_ptr<Reader> open(const std::string& path, FileKind kind,
-                               std::optional<std::span<const unsigned char>> memory) const override {
-    return open_file(path, kind, memory);
+  std::unique_ptr<Reader> open(const std::string& name, FileKind kind, std::shared_ptr<const Bytes> bytes,
+                               Guard guard) const override {
+    return open_file(name, kind, std::move(bytes), std::move(guard));
   }
   SaveReport save(const SaveRequest& request) const override { return save_file(request); }
   std::unique_ptr<Texture> open_texture(const std::string& path, Transfer transfer,

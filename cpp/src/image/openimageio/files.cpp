@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
 #include <fstream>
+#include <utility>
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
@@ -24,24 +24,24 @@ const char* plugin_name(FileKind kind) {
     case FileKind::tiff: return "tiff";
     case FileKind::png: return "png";
     case FileKind::jpeg: return "jpeg";
+    case FileKind::webp: return "webp";
   }
   return "";
 }
 
 // Bytes of pixels from one byte of the file: deflate, in PNG and TIFF, gives at most 1032; JPEG 1024: six blocks of two bits
-// at least for 16 x 16 pixels of 3 bytes, if its chroma is subsampled; LZW 2730. OpenEXR's DCT is not looked into.
-std::uint64_t most_expansion(FileKind kind) {
+// at least for 16 x 16 pixels of 3 bytes, if its chroma is subsampled; LZW 2730; T.6 a row of 65536 white pixels for one bit.
+// OpenEXR's DCT is not looked into.
+std::uint64_t most_expansion(FileKind kind, bool is_fax) {
   if (kind == FileKind::exr) return 0;
-  return kind == FileKind::tiff ? 2730 : 1100;
+  if (kind == FileKind::tiff) return is_fax ? 65536 : 2730;
+  return 1100;
 }
 
 class FileReader : public Reader {
  public:
-  FileReader(const std::string& path, FileKind kind, std::optional<std::span<const unsigned char>> memory)
-      : path_(path) {
-    if (memory) proxy_.emplace(memory->data(), memory->size());
-    input_ = open_input(path, kind, proxy_ ? &*proxy_ : nullptr, header_);
-  }
+  FileReader(const std::string& name, FileKind kind, std::shared_ptr<const Bytes> bytes, Guard guard)
+      : name_(name), input_(open_input(name, kind, std::move(bytes), std::move(guard), header_)) {}
 
   const Header& header() const override { return header_; }
 
@@ -50,15 +50,14 @@ class FileReader : public Reader {
     // The TIFF reader succeeds on a truncated file and only leaves a message.
     if (!input_->read_image(0, 0, 0, header_.channel_count(), OIIO::TypeDesc::FLOAT, pixels.data()) ||
         input_->has_error()) {
-      throw FileError(path_, "is damaged or truncated: " + one_line(input_->geterror()));
+      throw FileError(name_, "is damaged or truncated: " + one_line(input_->geterror()));
     }
   }
 
  private:
-  std::string path_;
-  std::optional<OIIO::Filesystem::IOMemReader> proxy_;
-  std::unique_ptr<OIIO::ImageInput> input_;
+  std::string name_;
   Header header_;
+  OpenInput input_;
 };
 
 OIIO::TypeDesc storage_type(PixelFormat format) {
@@ -137,11 +136,33 @@ void encode(const OIIO::ImageSpec& spec, FileKind kind, std::span<float> values,
 
 }  // namespace
 
-std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path, FileKind kind,
-                                             OIIO::Filesystem::IOProxy* proxy, Header& header) {
-  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(plugin_name(kind));
-  if (!input) throw FileError(path, "cannot be read: " + one_line(OIIO::geterror()));
-  if (proxy != nullptr && !input->set_ioproxy(proxy)) throw FileError(path, "cannot be read from memory");
+std::size_t GuardedBytes::read(void* to, std::size_t count) {
+  const std::size_t done = pread(to, count, m_pos);
+  m_pos += static_cast<std::int64_t>(done);
+  return done;
+}
+
+std::size_t GuardedBytes::pread(void* to, std::size_t count, std::int64_t offset) {
+  if (offset < 0) return 0;
+  return read_patched(*bytes_, patches_, static_cast<std::uint64_t>(offset),
+                      {static_cast<unsigned char*>(to), count});
+}
+
+OpenInput open_input(const std::string& path, FileKind kind, std::shared_ptr<const Bytes> bytes, Guard guard,
+                     Header& header) {
+  OpenInput input;
+  if (kind == FileKind::jpeg) {
+    input.memory.resize(bytes->size());
+    input.memory.resize(read_patched(*bytes, guard.patches, 0, input.memory));
+    input.bytes = std::make_unique<OIIO::Filesystem::IOMemReader>(input.memory.data(), input.memory.size());
+  } else {
+    input.bytes = std::make_unique<GuardedBytes>(path, std::move(bytes), std::move(guard.patches));
+  }
+  input.input = OIIO::ImageInput::create(plugin_name(kind));
+  if (!input.input) throw FileError(path, "cannot be read: " + one_line(OIIO::geterror()));
+  if (!input->set_ioproxy(input.bytes.get())) {
+    throw FileError(path, "cannot be read: this OpenImageIO reads its format only from files that it opens");
+  }
   // Unassociated alpha is multiplied in by us, in linear light, and not by the reader in encoded values.
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
@@ -163,25 +184,27 @@ std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path, FileKind k
   const std::string space = spec.get_string_attribute("oiio:ColorSpace");
   header.says_linear =
       space == "Linear" || space == "linear" || space == "scene_linear" || space.starts_with("lin_");
-  header.pixel_bytes = spec.pixel_bytes(true);
-  header.expansion = most_expansion(kind);
+  header.pixel_bits = guard.pixel_bits > 0 ? guard.pixel_bits : 8 * spec.pixel_bytes(true);
+  header.orientation = guard.orientation;
+  header.expansion = most_expansion(kind, guard.is_fax);
   header.expands_to_display = true;
   return input;
 }
 
-std::unique_ptr<OIIO::ImageInput> open_checked(const std::string& path, const ImageLimits& limits,
-                                               Header& header) {
-  const FileKind kind = kind_from_content(path);
-  check_complete(path, kind);
-  std::unique_ptr<OIIO::ImageInput> input = open_input(path, kind, nullptr, header);
+OpenInput open_checked(const std::string& path, const ImageLimits& limits, Header& header) {
+  std::shared_ptr<const Bytes> bytes = open_bytes(path);
+  const std::uint64_t size = bytes->size();
+  const FileKind kind = kind_of(path, *bytes);
+  Guard guard = guard_of(path, kind, *bytes);
+  OpenInput input = open_input(path, kind, std::move(bytes), std::move(guard), header);
   check_limits(path, header, limits);
-  check_expansion(path, header, std::filesystem::file_size(path));
+  check_expansion(path, header, size);
   return input;
 }
 
-std::unique_ptr<Reader> open_file(const std::string& path, FileKind kind,
-                                  std::optional<std::span<const unsigned char>> memory) {
-  return std::make_unique<FileReader>(path, kind, memory);
+std::unique_ptr<Reader> open_file(const std::string& name, FileKind kind, std::shared_ptr<const Bytes> bytes,
+                                  Guard guard) {
+  return std::make_unique<FileReader>(name, kind, std::move(bytes), std::move(guard));
 }
 
 SaveReport save_file(const SaveRequest& request) {

@@ -40,9 +40,9 @@ class LinearInput : public OIIO::ImageInput {
     const std::size_t path = name.find(':', transfer) + 1;
     try {
       Header header;
-      inner_ = open_checked(name.substr(path), ImageLimits{}, header);
+      inner_ = std::make_unique<OpenInput>(open_checked(name.substr(path), ImageLimits{}, header));
       is_srgb_ = is_srgb(header, static_cast<Transfer>(name[transfer] - '0'));
-      describe(inner_->spec());
+      describe((*inner_)->spec());
     } catch (const std::exception& e) {
       errorfmt("{}", e.what());
       return false;
@@ -56,12 +56,12 @@ class LinearInput : public OIIO::ImageInput {
     return true;
   }
 
-  int current_subimage() const override { return inner_ ? inner_->current_subimage() : 0; }
-  int current_miplevel() const override { return inner_ ? inner_->current_miplevel() : 0; }
+  int current_subimage() const override { return inner_ ? (*inner_)->current_subimage() : 0; }
+  int current_miplevel() const override { return inner_ ? (*inner_)->current_miplevel() : 0; }
 
   bool seek_subimage(int subimage, int miplevel) override {
-    if (!inner_ || subimage != 0 || !inner_->seek_subimage(subimage, miplevel)) return false;
-    describe(inner_->spec());
+    if (!inner_ || subimage != 0 || !(*inner_)->seek_subimage(subimage, miplevel)) return false;
+    describe((*inner_)->spec());
     return true;
   }
 
@@ -73,8 +73,8 @@ class LinearInput : public OIIO::ImageInput {
     yend = std::min(yend, m_spec.height);
     std::vector<float> source(static_cast<std::size_t>(m_spec.width) *
                               static_cast<std::size_t>(std::max(0, yend - ybegin)) * source_channels_);
-    if (!inner_->read_scanlines(subimage, miplevel, ybegin, yend, z, 0, static_cast<int>(source_channels_),
-                                OIIO::TypeDesc::FLOAT, source.data())) {
+    if (!(*inner_)->read_scanlines(subimage, miplevel, ybegin, yend, z, 0, static_cast<int>(source_channels_),
+                                   OIIO::TypeDesc::FLOAT, source.data())) {
       return fail();
     }
     convert(source, data);
@@ -84,7 +84,7 @@ class LinearInput : public OIIO::ImageInput {
   bool read_native_tile(int subimage, int miplevel, int x, int y, int z, void* data) override {
     if (!seek_subimage(subimage, miplevel)) return false;
     std::vector<float> source(static_cast<std::size_t>(m_spec.tile_pixels()) * source_channels_);
-    if (!inner_->read_tile(x, y, z, OIIO::TypeDesc::FLOAT, source.data())) return fail();
+    if (!(*inner_)->read_tile(x, y, z, OIIO::TypeDesc::FLOAT, source.data())) return fail();
     convert(source, data);
     return true;
   }
@@ -100,7 +100,7 @@ class LinearInput : public OIIO::ImageInput {
   }
 
   bool fail() {
-    errorfmt("{}", inner_->geterror());
+    errorfmt("{}", (*inner_)->geterror());
     return false;
   }
 
@@ -115,7 +115,7 @@ class LinearInput : public OIIO::ImageInput {
                                static_cast<int>(linear.size()));
   }
 
-  std::unique_ptr<OIIO::ImageInput> inner_;
+  std::unique_ptr<OpenInput> inner_;
   bool is_srgb_ = false;
   std::size_t source_channels_ = 0;
   std::size_t channels_ = 0;
@@ -166,13 +166,14 @@ struct Facts {
 Facts check_texels(const std::string& path, Transfer transfer, const ImageLimits& limits) {
   Facts facts;
   Header header;
-  const auto input = open_checked(path, limits, header);
+  const OpenInput input = open_checked(path, limits, header);
   const OIIO::ImageSpec& spec = input->spec();
   const int channels = colour_channels(spec);
   const bool has_last_alpha = spec.alpha_channel < 0 || spec.alpha_channel == spec.nchannels - 1;
   if ((channels != 1 && channels != 3) || !has_last_alpha) {
     throw FileError(path, "has " + std::to_string(spec.nchannels) + " channels, expected grey or R, G, B");
   }
+  if (header.orientation != 1) throw FileError(path, "is stored turned, expected a texture that is upright");
   if (header.data != header.display || spec.x != 0 || spec.y != 0) {
     throw FileError(path, "is cropped, expected a texture whose data window is its display window");
   }

@@ -26,6 +26,7 @@ from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.store import PemStore
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -103,7 +104,7 @@ class Evaluation:
         summary = {
             contender: {
                 run_time: {
-                    place: _finite(self.mean(contender, place, run_time=run_time)) for place in self.places
+                    place: finite(self.mean(contender, place, run_time=run_time)) for place in self.places
                 }
                 for run_time in RUN_TIMES
             }
@@ -114,12 +115,12 @@ class Evaluation:
                 "place": view.place,
                 "degrees": view.degrees,
                 "t": view.t,
-                "ceiling": _finite(view.ceiling),
+                "ceiling": finite(view.ceiling),
                 "reference_samples": view.samples,
                 "reference_s": view.seconds,
                 **{
                     metric: {
-                        contender: {run_time: _finite(value) for run_time, value in row.items()}
+                        contender: {run_time: finite(value) for run_time, value in row.items()}
                         for contender, row in figures.items()
                     }
                     for metric, figures in view.metrics.items()
@@ -131,7 +132,8 @@ class Evaluation:
         return json.dumps(content, indent=1) + "\n"
 
 
-def _finite(value: float | None) -> float | None:
+def finite(value: float | None) -> float | None:
+    """None for what is not finite."""
     return value if value is not None and math.isfinite(value) else None
 
 
@@ -181,6 +183,7 @@ def evaluate(
     stage: Stage | None = None,
     *,
     every_view: bool = False,
+    on_view: Callable[[SeenView], None] | None = None,
 ) -> Evaluation:
     """Compare a PEM with independent ray tracing and write metrics.json into its folder.
 
@@ -197,6 +200,8 @@ def evaluate(
         The PEM's scene, if it has been prepared already.
     every_view
         Look at every sample and between every two, not at a selection (`choose_views`).
+    on_view
+        Told about every view with the object in it, with its pictures.
 
     Raises
     ------
@@ -218,6 +223,8 @@ def evaluate(
         if seen is None:
             unseen.append(view.place)
         else:
+            if on_view is not None:
+                on_view(seen)
             figures.append(_figures(seen, before if view.place == "between" else None))
         before = seen
     report(len(views), len(views), f"{len(views)} views")

@@ -107,7 +107,7 @@ def _chosen(count: int, *, every: bool) -> list[int]:
     if every:
         return list(range(count))
     pairs = min(max(round(0.5 * math.sqrt(count)), 1), MOST_PAIRS)
-    return [int((stretch + 0.5) * count / pairs) for stretch in range(pairs)]
+    return [int((stretch + 0.5) * (count - 1) / pairs) for stretch in range(pairs)]
 
 
 def _view(place: str, t: float, camera: _core.Camera, sampled: list[_core.Camera]) -> View:

@@ -20,7 +20,7 @@ METRIC_TITLES = {
     "worst": "worst 1 %",
     "sliding": "sliding px",
 }
-_DIGITS = {"psnr": 2, "ssim": 4, "flip": 4, "worst": 3, "sliding": 2}
+METRIC_DIGITS = {"psnr": 2, "ssim": 4, "flip": 4, "worst": 3, "sliding": 2}
 
 
 def number(value: float | None, digits: int) -> str:
@@ -72,7 +72,7 @@ def metrics_tables(evaluation: Evaluation) -> list[Table]:
     for place in evaluation.places:
         for run_time in RUN_TIMES:
             values = (
-                number(evaluation.mean("pem", place, run_time=run_time, metric=metric), _DIGITS[metric])
+                number(evaluation.mean("pem", place, run_time=run_time, metric=metric), METRIC_DIGITS[metric])
                 for metric in METRIC_TITLES
             )
             table.add_row(PLACE_TITLES[place], run_time, *values)

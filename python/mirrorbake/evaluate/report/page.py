@@ -1,0 +1,349 @@
+"""The report of a PEM: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import html
+import math
+import platform
+import sys
+from importlib import metadata, resources
+from typing import TYPE_CHECKING
+
+from mirrorbake import _core
+from mirrorbake.evaluate.contenders import RUN_TIMES, TITLES
+from mirrorbake.evaluate.evaluate import Evaluation, SeenView, evaluate, finite
+from mirrorbake.evaluate.metrics import mean_or_none
+from mirrorbake.evaluate.places import PLACE_TITLES
+from mirrorbake.evaluate.report.pictures import Plot, colour, error_url, legend, picture_url
+from mirrorbake.evaluate.table import METRIC_DIGITS, METRIC_TITLES, number, present
+from mirrorbake.files import check_writable, write_text
+from mirrorbake.pem.store import GROUP_NAME, PemStore
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+    from mirrorbake.bake.bake import ProgressReport
+    from mirrorbake.scene.stage import Stage
+
+REPORT_NAME = "report.html"
+PICTURED = ("on", "between", "off_5", "above_10", "dome")
+"""Places of which a report has pictures: the first view of each."""
+
+
+def report(
+    directory: Path,
+    out: Path | None = None,
+    progress: ProgressReport | None = None,
+    stage: Stage | None = None,
+    sections: Iterable[Callable[[Path], str]] = (),
+) -> Path:
+    """Evaluate a PEM and write a report of it: a page that needs no other file and no network.
+
+    Parameters
+    ----------
+    directory
+        Holds a complete PEM.
+    out
+        The HTML file; default: `DIR/report.html`.
+    progress
+        Told about every view.
+    stage
+        The PEM's scene, if it has been prepared already.
+    sections
+        What makes further sections of a PEM's folder: HTML, or nothing.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        It cannot be written to; found out before the evaluation.
+    StoreError
+        As `evaluate` raises it.
+    """
+    out = out or directory / REPORT_NAME
+    check_writable(out)
+    pictured: dict[str, SeenView] = {}
+
+    def keep(seen: SeenView) -> None:
+        if seen.view.place in PICTURED:
+            pictured.setdefault(seen.view.place, seen)
+
+    evaluation = evaluate(directory, progress, stage, on_view=keep)
+    store = PemStore.open(directory)
+    parts = [
+        _head(store, evaluation),
+        _table(evaluation),
+        _curves(evaluation),
+        _pictures(pictured),
+        _metrics(evaluation),
+        *(section(directory) for section in sections),
+        _plan(store),
+        _cost(store, evaluation),
+        _about(store, evaluation),
+    ]
+    write_text(out, _page(f"mirrorbake: {_name(store)}", "\n".join(part for part in parts if part)))
+    return out
+
+
+def _page(title: str, body: str) -> str:
+    folder = resources.files("mirrorbake.evaluate.report")
+    style, script = ((folder / name).read_text(encoding="utf-8") for name in ("style.css", "script.js"))
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{html.escape(title)}</title>\n<style>\n{style}</style></head>\n"
+        f"<body>\n{body}\n<script>\n{script}</script></body></html>\n"
+    )
+
+
+def _name(store: PemStore) -> str:
+    reflector = store.header.source.config["reflector"]
+    name = reflector["object"] or reflector["scene_object"] or reflector["mesh"]
+    return str(name).replace("\\", "/").rsplit("/", 1)[-1]
+
+
+def _head(store: PemStore, evaluation: Evaluation) -> str:
+    header, views = store.header, store.header.source.config["views"]
+    width, height = header.image_size
+    lines = [
+        f"<h1>{html.escape(_name(store))}</h1>",
+        f'<p class="lead">{html.escape(verdict(evaluation))}</p>',
+    ]
+    count = len(header.parameters)
+    lines.append(
+        f'<p class="soft">{count} view{"s" * (count != 1)} over {abs(views["degrees"]):g}°, {width}×{height} '
+        f"pixels, maps of {header.map_size}²×6 texels with all their levels.</p>"
+    )
+    lines += [f'<p class="soft">Note: {html.escape(note)}.</p>' for note in evaluation.notes]
+    return "\n".join(lines)
+
+
+def verdict(evaluation: Evaluation) -> str:
+    """One or two sentences on what the figures say."""
+    names = present(evaluation)
+    static = [name for name in names if name.startswith("static")]
+    on, between = (evaluation.mean("pem", place) for place in ("on", "between"))
+    if on is None or not static:
+        return "The object covers no pixel of the evaluated views wholly: there is nothing to measure."
+    best = max(static, key=lambda name: evaluation.mean(name, "on") or -math.inf)
+    there = evaluation.mean(best, "on")
+    assert there is not None
+    words = f"The PEM agrees with ray tracing to {on:.1f} dB on its samples"
+    words += "" if between is None else f" and {between:.1f} dB between them"
+    words += f"; the best static map ({_lowered(TITLES[best])}) to {there:.1f} dB."
+    worse = [
+        place
+        for place in evaluation.places
+        if (evaluation.mean("pem", place) or math.inf) < (evaluation.mean(best, place) or -math.inf)
+    ]
+    if on < there + 1.0:
+        words += " That is no lead worth the bytes of a PEM: the static map does as well here."
+    elif worse:
+        words += f" The static map is the better one {', '.join(PLACE_TITLES[place] for place in worse)}."
+    return words
+
+
+def _lowered(title: str) -> str:
+    return title[:1].lower() + title[1:]
+
+
+def _rows(heading: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    head = "".join(f"<th>{html.escape(cell)}</th>" for cell in heading)
+    body = "\n".join("<tr>" + "".join(rows_cells) + "</tr>" for rows_cells in rows)
+    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table></div>'
+
+
+def _cell(words: str, kind: str = "") -> str:
+    return f'<td class="{kind}">{html.escape(words)}</td>' if kind else f"<td>{html.escape(words)}</td>"
+
+
+def _table(evaluation: Evaluation) -> str:
+    names = present(evaluation)
+    parts = ["<h2>Against ray tracing</h2>", f'<p class="soft">{html.escape(_YARDSTICK)}</p>']
+    for run_time in RUN_TIMES:
+        rows = []
+        for place in evaluation.places:
+            views = [view for view in evaluation.views if view.place == place]
+            values = [evaluation.mean(name, place, run_time=run_time) for name in names]
+            best = max((value for value in values if value is not None), default=None)
+            cells = [
+                _cell(number(value, 1), "best" if value is not None and value == best else "")
+                for value in values
+            ]
+            degrees = max(view.degrees for view in views)
+            ceiling = mean_or_none([view.ceiling for view in views])
+            rows.append(
+                [_cell(PLACE_TITLES[place]), _cell(f"{degrees:.3g}°"), *cells, _cell(number(ceiling, 1))]
+            )
+        heading = ["PSNR, dB", "from a sample", *(TITLES[name] for name in names), "ceiling"]
+        if len(RUN_TIMES) > 1:
+            parts.append(f"<h3>Run time {run_time}</h3>")
+        parts.append(_rows(heading, rows))
+    return "\n".join(parts)
+
+
+_YARDSTICK = (
+    "PSNR of what a display shows, over the pixels that the object covers wholly, against ray tracing with "
+    "random numbers of its own. The ceiling is what the true image would have against that reference: its "
+    "own noise, which has been taken off the other figures."
+)
+
+
+def _curves(evaluation: Evaluation) -> str:
+    names = present(evaluation)
+    along = [view for view in evaluation.views if view.place in _ALONG]
+    others = [view for view in evaluation.views if view.place not in _ALONG]
+    if len(along) < 2:
+        return ""
+    parts = ["<h2>Error against angle</h2>"]
+    for run_time in RUN_TIMES:
+        values = [
+            value
+            for view in evaluation.views
+            for name in names
+            if (value := view.metrics["psnr"].get(name, {}).get(run_time)) is not None
+        ]
+        if not values:
+            continue
+        title = f"PSNR against degrees from the nearest sample; run time {run_time}"
+        degrees = [view.degrees for view in evaluation.views]
+        plot = Plot(degrees, values, ("degrees from the nearest sample", "dB"), title=title)
+        # The first contender lies on top.
+        for name in reversed(names):
+            points = [
+                (view.degrees, value)
+                for view in sorted(along, key=lambda view: view.degrees)
+                if (value := view.metrics["psnr"].get(name, {}).get(run_time)) is not None
+            ]
+            plot.curve(points, f'style="stroke:{colour(name)}" stroke-width="2"')
+            for kind, views in (("solid", along), ("hollow", others)):
+                for view in views:
+                    value = view.metrics["psnr"].get(name, {}).get(run_time)
+                    if value is not None:
+                        fill = colour(name) if kind == "solid" else "var(--paper)"
+                        style = f'style="fill:{fill};stroke:{colour(name)}" stroke-width="1.5"'
+                        words = f"{TITLES[name]}, {PLACE_TITLES[view.place]}: {value:.1f} dB"
+                        plot.point(view.degrees, value, style, words)
+        parts += [f'<div class="scroll">{plot.svg()}</div>', legend(names)]
+    parts.append('<p class="soft">Lines: along the arc and past its end. Hollow: above and below it.</p>')
+    return "\n".join(parts)
+
+
+_ALONG = frozenset(place for place in PLACE_TITLES if place in ("on", "between") or place.startswith("off"))
+
+
+def _pictures(pictured: dict[str, SeenView]) -> str:
+    if not pictured:
+        return ""
+    scale = (
+        '<p class="soft">Below each picture its error: <span class="scale"></span> '
+        "0 to 0.25 of the display's range. Drag across a picture to compare.</p>"
+    )
+    cards = [_card(pictured[place]) for place in PICTURED if place in pictured]
+    return "\n".join(["<h2>Side by side</h2>", scale, *cards])
+
+
+def _card(seen: SeenView) -> str:
+    reference, view, run_time = seen.reference, seen.view, RUN_TIMES[0]
+    true = reference.images.beauty
+    names = list(seen.pictures)
+    traced = picture_url(true)
+    figures, buttons = [f'<figure><img alt="Ray traced" src="{traced}">Ray traced</figure>'], []
+    first = ""
+    for name in names:
+        light = seen.pictures[name][run_time]
+        picture = reference.images.composite(light)
+        title, url = html.escape(TITLES[name]), picture_url(picture)
+        first = first or url
+        figures.append(
+            f'<figure><img alt="{title}" data-name="{name}" src="{url}">'
+            f'<img alt="Its error" src="{error_url(picture, true)}">'
+            f"{title}: <b>{number(reference.psnr(light), 1)} dB</b></figure>"
+        )
+        pressed = "true" if name == names[0] else "false"
+        buttons.append(f'<button type="button" data-name="{name}" aria-pressed="{pressed}">{title}</button>')
+    about = f"{view.degrees:.3g}° from a sample · {reference.samples} samples per pixel"
+    about += f" · ceiling {number(finite(reference.ceiling), 1)} dB"
+    return (
+        f'<section class="place"><header><h3>{html.escape(PLACE_TITLES[view.place].capitalize())}</h3>'
+        f'<span class="soft">{about}</span></header>\n'
+        f'<div class="compare"><img alt="Ray traced" src="{traced}">'
+        f'<img class="over" alt="{html.escape(TITLES[names[0]])}" src="{first}"><span class="bar"></span>'
+        f'<span class="tag left">{html.escape(TITLES[names[0]])}</span>'
+        '<span class="tag right">Ray traced</span></div>\n'
+        '<input class="slide" type="range" min="0" max="100" value="50" step="any" '
+        'aria-label="How much of the left picture shows">\n'
+        f'<div class="pick">{"".join(buttons)}</div>\n<div class="strip">{"".join(figures)}</div></section>'
+    )
+
+
+def _metrics(evaluation: Evaluation) -> str:
+    rows = [
+        [
+            _cell(PLACE_TITLES[place]),
+            _cell(run_time),
+            *(
+                _cell(number(evaluation.mean("pem", place, run_time=run_time, metric=metric), digits))
+                for metric, digits in METRIC_DIGITS.items()
+            ),
+        ]
+        for place in evaluation.places
+        for run_time in RUN_TIMES
+    ]
+    words = (
+        "SSIM: 1 is best. FLIP: 0 is best. Worst 1 %: RMS error of those pixels, in display values. Sliding: "
+        "error of the motion of reflections since the sample before."
+    )
+    heading = ["The PEM", "run time", *(METRIC_TITLES[metric] for metric in METRIC_DIGITS)]
+    return f'<h2>By every metric</h2>\n<p class="soft">{words}</p>\n{_rows(heading, rows)}'
+
+
+def _plan(store: PemStore) -> str:
+    rows = []
+    for decision in store.header.plan.decisions:
+        value = str(decision.value).lower() if isinstance(decision.value, bool) else str(decision.value)
+        reason = decision.reason if decision.part is None else f"{decision.part}: {decision.reason}"
+        rows.append([_cell(decision.key), _cell(value), _cell(reason, "words")])
+    return "<h2>What was decided, and why</h2>\n" + _rows(["key", "value", "reason"], rows)
+
+
+def _bytes(path: Path) -> int:
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+
+
+def megabytes(count: float) -> str:
+    """Words for a number of bytes."""
+    return f"{count / 1e6:.3g} MB" if count >= 1e6 else f"{count / 1e3:.3g} kB"
+
+
+def _cost(store: PemStore, evaluation: Evaluation) -> str:
+    count = len(store.header.parameters)
+    timings = [store.read_timings(index) for index in range(count)]
+    group = store.directory / GROUP_NAME
+    maps, whole = _bytes(group / "maps"), _bytes(group)
+    rows = [
+        ("tracing", f"{sum(t.trace_s for t in timings) / count:.2f} s a view"),
+        ("building matrices", f"{sum(t.build_s for t in timings) / count:.2f} s a view"),
+        ("solving", f"{sum(t.solve_s for t in timings) / count:.2f} s a view"),
+        ("maps on disk", f"{megabytes(maps)}, {megabytes(maps / count)} a view"),
+        ("the whole PEM on disk", megabytes(whole)),
+        ("references traced", f"{sum(view.seconds for view in evaluation.views):.1f} s"),
+    ]
+    return "<h2>Time and bytes</h2>\n" + _rows(["what", "cost"], [[_cell(a), _cell(b)] for a, b in rows])
+
+
+def _about(store: PemStore, evaluation: Evaluation) -> str:
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "zarr", "scikit-image"))
+    machine = f"{platform.machine()}, {_core.active_isa()}, {_core.thread_count()} threads"
+    fingerprint = store.header.fingerprint[:16]
+    return (
+        '<h2>About this report</h2>\n<p class="soft">'
+        f"Baked by mirrorbake {html.escape(store.header.source.library)}, reported by {_core.version()} "
+        f"({machine}; Python {sys.version.split()[0]}, {versions}). PEM {fingerprint}. "
+        f"Display: {html.escape(evaluation.header['display_transform'])}.</p>"
+    )

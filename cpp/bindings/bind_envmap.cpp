@@ -212,14 +212,15 @@ void bind_envmap(nb::module_& m) {
       "Direction and differentials of the reflection cone through a pixel's corners.");
   m.def("reflected_differential", &reflected_differential, nb::arg("direction"), nb::arg("normal"),
         nb::arg("dd"), nb::arg("dn"), "Differential of the mirror direction of a ray (Igehy 1999).");
+  nb::enum_<ConventionWay>(m, "ConventionWay", "Which of a map's two orientations is the given one.")
+      .value("from_foreign", ConventionWay::from_foreign, "the other program's")
+      .value("to_foreign", ConventionWay::to_foreign, "ours");
   m.def(
       "convert_convention",
-      [](const EnvMapLayout& layout, FloatArray values, const std::string& name, bool to_foreign) {
-        return block(convert_convention(view(layout, values), name,
-                                        to_foreign ? ConventionWay::to_foreign : ConventionWay::from_foreign)
-                         .values);
+      [](const EnvMapLayout& layout, FloatArray values, const std::string& name, ConventionWay way) {
+        return block(convert_convention(view(layout, values), name, way).values);
       },
-      nb::arg("layout"), nb::arg("values"), nb::arg("name"), nb::arg("to_foreign"),
+      nb::arg("layout"), nb::arg("values"), nb::arg("name"), nb::arg("way"),
       "The map in, or from, the orientation of openexr, oiio, mitsuba, threejs or ktx2.");
   m.def(
       "load_envmap",

@@ -178,14 +178,22 @@ void bind_shading(nb::module_& m) {
       },
       nb::arg("metal"), nb::arg("c").noconvert(), nb::arg("illuminant"),
       "float64 (c.size, 3): linear Rec.709.");
+  nb::class_<MetalFit>(m, "MetalFit",
+                       "Three-channel models of a metal, and their largest error over all angles.")
+      .def_prop_ro(
+          "r0", [](const MetalFit& fit) { return triple(fit.schlick.r0); }, "of Schlick's model")
+      .def_prop_ro("r0_error", [](const MetalFit& fit) { return triple(fit.schlick_error); })
+      .def_prop_ro(
+          "eta", [](const MetalFit& fit) { return triple(fit.conductor.eta); }, "of the conductor")
+      .def_prop_ro(
+          "k", [](const MetalFit& fit) { return triple(fit.conductor.k); }, "of the conductor")
+      .def_prop_ro("index_error", [](const MetalFit& fit) { return triple(fit.conductor_error); });
   m.def(
       "fit_metal",
       [](const std::string& metal, const std::string& illuminant) {
-        const MetalFit fit = fit_metal(parse_metal(metal), parse_illuminant(illuminant));
-        return std::tuple(triple(fit.schlick.r0), triple(fit.schlick_error), triple(fit.conductor.eta),
-                          triple(fit.conductor.k), triple(fit.conductor_error));
+        return fit_metal(parse_metal(metal), parse_illuminant(illuminant));
       },
-      nb::arg("metal"), nb::arg("illuminant"), "(r0, its error, eta, k, their error), each per channel.");
+      nb::arg("metal"), nb::arg("illuminant"));
 
   m.def(
       "active_isa", [] { return std::string(to_string(active_isa())); },

@@ -83,13 +83,3 @@ function(mirrorbake_add_tool name)
     INSTALL_RPATH "$<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>/${library_dir}")
   install(TARGETS ${name} COMPONENT tools)
 endfunction()
-
-# mirrorbake_add_benchmark(NAME SOURCES ... DEPENDS module...): one Google Benchmark program bench_NAME.
-function(mirrorbake_add_benchmark name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;DEPENDS;PRIVATE")
-  add_executable(bench_${name} ${arg_SOURCES})
-  target_link_libraries(bench_${name} PRIVATE mirrorbake_build_flags benchmark::benchmark_main ${arg_PRIVATE})
-  foreach(module IN LISTS arg_DEPENDS)
-    target_link_libraries(bench_${name} PRIVATE mirrorbake::${module})
-  endforeach()
-endfunction()

@@ -26,10 +26,15 @@ def thread_count() -> int:
 
 class ThreadLimit:
     """
-    While it lives, the library uses at most `threads` threads (0: all cores).
+    The library uses at most `threads` threads, 0 to 1024 (0: all cores), to the end of a block
+    `with ThreadLimit(1): ...`, or else while the object lives. The smallest of several holds.
     """
 
     def __init__(self, threads: int) -> None: ...
+
+    def __enter__(self) -> ThreadLimit: ...
+
+    def __exit__(self, *exception: object) -> None: ...
 
 class Proxy:
     """
@@ -1350,7 +1355,16 @@ def footprint_from_corners(top_left: Sequence[float], top_right: Sequence[float]
 def reflected_differential(direction: Sequence[float], normal: Sequence[float], dd: Sequence[float], dn: Sequence[float]) -> Sequence[float]:
     """Differential of the mirror direction of a ray (Igehy 1999)."""
 
-def convert_convention(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], name: str, to_foreign: bool) -> NDArray[numpy.float32]:
+class ConventionWay(enum.Enum):
+    """Which of a map's two orientations is the given one."""
+
+    from_foreign = 0
+    """the other program's"""
+
+    to_foreign = 1
+    """ours"""
+
+def convert_convention(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], name: str, way: ConventionWay) -> NDArray[numpy.float32]:
     """
     The map in, or from, the orientation of openexr, oiio, mitsuba, threejs or ktx2.
     """
@@ -1674,8 +1688,30 @@ def metal_optical_constants(metal: str) -> NDArray[numpy.float64]:
 def metal_reflectance(metal: str, c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], illuminant: str) -> NDArray[numpy.float64]:
     """float64 (c.size, 3): linear Rec.709."""
 
-def fit_metal(metal: str, illuminant: str) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
-    """(r0, its error, eta, k, their error), each per channel."""
+class MetalFit:
+    """
+    Three-channel models of a metal, and their largest error over all angles.
+    """
+
+    @property
+    def r0(self) -> tuple[float, float, float]:
+        """of Schlick's model"""
+
+    @property
+    def r0_error(self) -> tuple[float, float, float]: ...
+
+    @property
+    def eta(self) -> tuple[float, float, float]:
+        """of the conductor"""
+
+    @property
+    def k(self) -> tuple[float, float, float]:
+        """of the conductor"""
+
+    @property
+    def index_error(self) -> tuple[float, float, float]: ...
+
+def fit_metal(metal: str, illuminant: str) -> MetalFit: ...
 
 def active_isa() -> str:
     """Instruction set in use: 'baseline', 'sse42', 'avx2' or 'avx512'."""

@@ -256,14 +256,14 @@ class EnvMap:
 
     def to_convention(self, name: str) -> EnvMap:
         """Return the map as openexr, oiio, mitsuba, threejs or ktx2 orient it. One level only."""
-        return self._converted(name, to_foreign=True)
+        return self._converted(name, _core.ConventionWay.to_foreign)
 
     def from_convention(self, name: str) -> EnvMap:
         """Return our map of one that openexr, oiio, mitsuba, threejs or ktx2 orient. One level only."""
-        return self._converted(name, to_foreign=False)
+        return self._converted(name, _core.ConventionWay.from_foreign)
 
-    def _converted(self, name: str, *, to_foreign: bool) -> EnvMap:
-        values = _core.convert_convention(self.layout, self.values, name, to_foreign)
+    def _converted(self, name: str, way: _core.ConventionWay) -> EnvMap:
+        values = _core.convert_convention(self.layout, self.values, name, way)
         return EnvMap(self.layout, values, self.channels)
 
     def flux(self, level: int = 0) -> NDArray[np.float64]:

@@ -299,10 +299,12 @@ class MetalColour:
 
 def metal_colour(metal: str, illuminant: str = "D65") -> MetalColour:
     """Fit three-channel models to :func:`metal_reflectance`."""
-    r0, r0_error, eta, k, index_error = _core.fit_metal(metal, illuminant)
+    fit = _core.fit_metal(metal, illuminant)
     red, green, blue = metal_reflectance(metal, 1.0, illuminant).tolist()
     source = _core.metal_source(metal)
-    return MetalColour(metal, illuminant, source, (red, green, blue), r0, r0_error, eta, k, index_error)
+    return MetalColour(
+        metal, illuminant, source, (red, green, blue), fit.r0, fit.r0_error, fit.eta, fit.k, fit.index_error
+    )
 
 
 def combine_layers(f: ArrayLike, mirror: ArrayLike, diffuse: ArrayLike) -> Array:

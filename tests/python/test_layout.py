@@ -138,6 +138,29 @@ def test_python_imports_go_down_or_stay() -> None:
     assert not violations
 
 
+def test_modules_link_what_they_include() -> None:
+    """What a module includes lies in the closure of what it links, so that it builds on its own."""
+    links = {}
+    for path in (CPP / "src").glob("*/CMakeLists.txt"):
+        call = re.search(
+            r"mirrorbake_add_module\((\w+)\s(.*?)\)", path.read_text(encoding="utf-8"), re.DOTALL
+        )
+        assert call, path
+        depends = re.search(r"DEPENDS\s+([a-z\s]+)", call[2])
+        links[call[1]] = set(depends[1].split()) if depends else set()
+
+    def closure(module: str) -> set[str]:
+        return {module}.union(*(closure(other) for other in links[module]))
+
+    violations = {
+        f"{path.relative_to(ROOT)} includes {include}"
+        for module, path, includes in module_sources()
+        for include in includes
+        if include.startswith("mirrorbake/") and include.split("/")[1] not in closure(module)
+    }
+    assert not violations
+
+
 @pytest.mark.parametrize("library", OWNERS)
 def test_third_party_library_stays_behind_its_module(library: str) -> None:
     headers = CPP / "include"

@@ -41,9 +41,8 @@ def analyze_command(
     from mirrorbake.scene.stage import prepare_stage
 
     config = scene_config(scene, assignments, views, size, spp, em_size, seed)
-    limit = _core.ThreadLimit(threads)
-    plan = analyze(prepare_stage(config))
-    del limit
+    with _core.ThreadLimit(threads):
+        plan = analyze(prepare_stage(config))
     if json:
         typer.echo(json_module.dumps(plan.to_json(), indent=1))
         return

@@ -50,10 +50,8 @@ def bake_command(
     from mirrorbake.bake.bake import bake
 
     config = scene_config(scene, assignments, views, size, spp, em_size, seed)
-    limit = _core.ThreadLimit(threads)
-    with progress() as add_bar:
+    with _core.ThreadLimit(threads), progress() as add_bar:
         summary = bake(config, out, add_bar("bake"), on_plan=print_plan)
-    del limit
     warnings = list(summary.notes)
     if summary.clamped:
         warnings.append(

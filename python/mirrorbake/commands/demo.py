@@ -24,9 +24,7 @@ def demo_command(
     """Bake and evaluate a small teapot scene: about a minute on two cores."""
     from mirrorbake.evaluate.demo import run_demo
 
-    limit = _core.ThreadLimit(threads)
-    with progress() as add_bar:
+    with _core.ThreadLimit(threads), progress() as add_bar:
         evaluation, sheet = run_demo(out, add_bar)
-    del limit
     print_figures(evaluation, json)
     messages.print(f"wrote {sheet}", markup=False, soft_wrap=True)

@@ -29,10 +29,8 @@ def evaluate_command(
     """Compare a PEM and its rivals with independent ray tracing, on its samples, between and off them."""
     from mirrorbake.evaluate.evaluate import METRICS_NAME, evaluate
 
-    limit = _core.ThreadLimit(threads)
-    with progress() as add_bar:
+    with _core.ThreadLimit(threads), progress() as add_bar:
         evaluation = evaluate(directory, add_bar("evaluate"), every_view=every)
-    del limit
     print_figures(evaluation, json)
     if evaluation.written:
         messages.print(f"wrote {directory / METRICS_NAME}", markup=False, soft_wrap=True)

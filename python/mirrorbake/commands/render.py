@@ -34,7 +34,6 @@ def render_command(
     """Draw a PEM at any parameter of its arc, blended between the neighbouring views."""
     from mirrorbake.pem.render import render
 
-    limit = _core.ThreadLimit(threads)
-    render(directory, view, out)
-    del limit
+    with _core.ThreadLimit(threads):
+        render(directory, view, out)
     messages.print(f"wrote {out}", markup=False, soft_wrap=True)

@@ -46,12 +46,11 @@ def fresnel_command(
     """Error and time of the Fresnel models: rounding, Schlick, tables, metals."""
     from mirrorbake.study import fresnel
 
-    limit = _core.ThreadLimit(threads)
     try:
-        result = fresnel.study(max_error, samples)
+        with _core.ThreadLimit(threads):
+            result = fresnel.study(max_error, samples)
     except _core.InvalidArgument as failure:
         raise OptionError(str(failure)) from None
-    del limit
     if out is not None:
         for path in fresnel.plot(result, out):
             typer.echo(f"wrote {path}", err=True)

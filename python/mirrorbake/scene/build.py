@@ -177,7 +177,8 @@ def _stand_on_ground(positions: NDArray[np.float64], reflector: Reflector) -> ND
 def _material(config: MaterialConfig, scene: _core.Scene) -> int:
     eta, k = config.eta or config.ior or (1.5, 1.5, 1.5), config.k or (0.0, 0.0, 0.0)
     if config.metal is not None:
-        _, _, eta, k, _ = _core.fit_metal(config.metal, ILLUMINANT)
+        fit = _core.fit_metal(config.metal, ILLUMINANT)
+        eta, k = fit.eta, fit.k
     model = getattr(_core.FresnelModel, config.fresnel)
     fresnel = _core.Fresnel(model=model, r0=config.r0 or (0.9, 0.9, 0.9), eta=eta, k=k)
     texture = _core.TextureReference()

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "mirrorbake/core/error.hpp"
-#include "mirrorbake/shading/layers.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -72,16 +71,6 @@ TEST(Metals, NamesAndSymbolsParse) {
   for (Metal metal : all_metals()) EXPECT_EQ(parse_metal(to_string(metal)), metal);
   EXPECT_EQ(parse_metal("Au"), Metal::gold);
   EXPECT_THROW(parse_metal("unobtainium"), InvalidArgument);
-}
-
-TEST(Layers, AWhiteFurnaceStaysWhiteUnderACoat) {
-  const glm::vec3 one(1.0F);
-  for (float c : {0.0F, 0.3F, 1.0F}) {
-    const glm::vec3 f = evaluate({FresnelModel::dielectric, {}, glm::vec3(1.5F)}, c);
-    const glm::vec3 coated = combine_coated(f, one, one);
-    for (int i = 0; i < 3; ++i) EXPECT_FLOAT_EQ(coated[i], 1.0F);
-    EXPECT_EQ(combine_layers(f, one, glm::vec3(0.25F)), f + 0.25F);
-  }
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ from mirrorbake.commands.analyze import analyze_command
 from mirrorbake.commands.bake import bake_command
 from mirrorbake.commands.demo import demo_command
 from mirrorbake.commands.evaluate import evaluate_command
+from mirrorbake.commands.export import export_command
 from mirrorbake.commands.render import render_command
 from mirrorbake.commands.report import report_command
 from mirrorbake.commands.study import app as study_app
@@ -31,6 +32,7 @@ app.command("analyze")(analyze_command)
 app.command("evaluate")(evaluate_command)
 app.command("report")(report_command)
 app.command("render")(render_command)
+app.command("export")(export_command)
 app.command("demo")(demo_command)
 app.add_typer(study_app, name="study")
 

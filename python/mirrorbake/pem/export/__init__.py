@@ -1,0 +1,1 @@
+"""A PEM for other programs: its maps, its mesh, its pictures."""

@@ -1,0 +1,84 @@
+"""The maps of a PEM as exporters see them, whatever its container looks like."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mirrorbake import _core
+from mirrorbake.errors import OptionError
+
+if TYPE_CHECKING:
+    from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.store import PemStore
+
+
+@dataclass(frozen=True, eq=False)
+class ShellMap:
+    """One shell of a part: its map and the shape that the map lies on."""
+
+    name: str
+    proxy: dict[str, Any]
+    """As `mirrorbake.proxy.proxy_to_attributes` returns it: world space, metres."""
+    size: int
+    """Texels along a side of a face of the finest level."""
+    pyramid: FloatArray
+    """(texels, C), float32: all levels, the finest first; opaque RGB, or premultiplied RGBA."""
+
+    @property
+    def channels(self) -> int:
+        """Numbers per texel."""
+        return int(self.pyramid.shape[1])
+
+    @property
+    def levels(self) -> int:
+        """Number of levels, down to one texel a face."""
+        return self.size.bit_length()
+
+    def level(self, index: int) -> FloatArray:
+        """Level of shape (6, s, s, C), s = size >> index."""
+        start = sum(6 * (self.size >> i) ** 2 for i in range(index))
+        side = self.size >> index
+        return self.pyramid[start : start + 6 * side * side].reshape(6, side, side, self.channels)
+
+
+@dataclass(frozen=True, eq=False)
+class MapSet:
+    """What draws the reflector at one value of the parameter."""
+
+    name: str
+    """`static`, or `sample-0000` and so on."""
+    parameter: float | None
+    """Where it was sampled, 0 to 1; None for the static set."""
+    parts: dict[str, list[ShellMap]]
+    """Shells of every part, front to back."""
+
+
+def static_set(store: PemStore) -> MapSet:
+    """The set that needs no parameter: the captured surroundings, on the outermost shell's geometry."""
+    header = store.header
+    proxy = header.static["proxy"] or header.static["infinite"]
+    shell = ShellMap("static", proxy, header.map_size, _core.build_cube_pyramid(store.read_capture()))
+    return MapSet("static", None, {part["name"]: [shell] for part in header.parts})
+
+
+def sample_set(store: PemStore, index: int) -> MapSet:
+    """The maps of one sample.
+
+    Raises
+    ------
+    OptionError
+        There is no such sample.
+    """
+    header = store.header
+    count = len(header.parameters)
+    if not 0 <= index < count:
+        raise OptionError(f"sample = {index}: expected 0 to {count - 1}")
+    parts = {
+        part["name"]: [
+            ShellMap(name, proxy, header.map_size, store.read_map(part["name"], name, index))
+            for name, proxy in part["layers"].items()
+        ]
+        for part in header.parts
+    }
+    return MapSet(f"sample-{index:04d}", header.parameters[index], parts)

@@ -1,0 +1,164 @@
+"""Maps of a PEM as files that other programs read."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.envmap import EnvMap
+from mirrorbake.errors import InputError, OptionError
+from mirrorbake.files import write_text
+from mirrorbake.pem.export.frames import FRAMES, Frame, move_proxy, source_from_panorama, turn_cube
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+    from mirrorbake.pem.export.map_sets import MapSet, ShellMap
+
+DESCRIPTION_NAME = "maps.json"
+DESCRIPTION_VERSION = 1
+
+FORMATS = ("ktx2", "exr")
+PRECISIONS = ("half", "float32")
+
+
+def export_maps(
+    sets: Iterable[MapSet],
+    folder: Path,
+    *,
+    format: str = "ktx2",
+    convention: str = "threejs",
+    precision: str = "half",
+    report: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Write sets of maps and a `maps.json` that says what they are.
+
+    Parameters
+    ----------
+    sets
+        Read one after the other: not all are in memory at once. A shell that several parts share is
+        written once.
+    folder
+        Made if it is not there. Files of the same names are replaced; `maps.json` is written last.
+    format
+        `ktx2`: all levels of a cube map in a file. `exr`: for programs that take cube maps, one image per
+        level with its six faces in a row; for those that take panoramas (blender, unreal), the finest level
+        as one.
+    convention
+        A name of `FRAMES`: whose coordinates and orientation.
+    precision
+        Of the files. `float32` keeps the values of all levels exactly; `half` rounds them.
+    report
+        Called with a sentence for each thing to know, such as values that were clamped.
+
+    Returns
+    -------
+    dict
+        What `maps.json` holds.
+
+    Raises
+    ------
+    OptionError
+        A name is unknown, or its program reads no cube maps and `format` is `ktx2`.
+    InputError, mirrorbake.FileError
+        The folder cannot be written.
+    """
+    frame = _frame(convention, format, precision)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as failure:
+        raise InputError(f"{folder}: cannot write: {failure.strerror or failure}") from None
+    description: dict[str, Any] = {
+        "generator": f"mirrorbake {_core.version()}",
+        "version": DESCRIPTION_VERSION,
+        "convention": convention,
+        "space_from_world": frame.space_matrix.tolist(),
+        "lookup_from_space": (frame.lookup_matrix @ frame.space_matrix.T).tolist(),
+        "radiance": "scene-linear, Rec.709 primaries; four channels: premultiplied by the fourth, alpha",
+        "shells": "front to back: L = L0 + (1 - a0) (L1 + (1 - a1) (...))",
+        "sets": [],
+    }
+    clamped = 0
+    for maps in sets:
+        parts = []
+        written: dict[int, dict[str, Any]] = {}
+        for part, shells in maps.parts.items():
+            entries = []
+            for shell in shells:
+                if id(shell) not in written:
+                    everywhere = all(any(s is shell for s in others) for others in maps.parts.values())
+                    stem = (
+                        maps.name
+                        if shell.name == maps.name and everywhere
+                        else f"{maps.name}.{part}.{shell.name}"
+                    )
+                    files, count = _write_shell(shell, folder, stem, frame, format, precision)
+                    clamped += count
+                    written[id(shell)] = _describe(shell, frame, files, format)
+                entries.append(written[id(shell)])
+            parts.append({"name": part, "shells": entries})
+        description["sets"].append({"name": maps.name, "parameter": maps.parameter, "parts": parts})
+    write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=1) + "\n")
+    if clamped and report is not None:
+        report(
+            f"{clamped} values beyond ±65504 were clamped to what half floats hold; use float32 to keep them"
+        )
+    return description
+
+
+def _frame(convention: str, format: str, precision: str) -> Frame:
+    for name, value, known in (
+        ("format", format, FORMATS),
+        ("precision", precision, PRECISIONS),
+        ("convention", convention, tuple(FRAMES)),
+    ):
+        if value not in known:
+            raise OptionError(f"{name} = {value!r}: expected {', '.join(known[:-1])} or {known[-1]}")
+    if convention == "blender" and format == "ktx2":
+        raise OptionError(
+            "format = 'ktx2': Blender reads no cube maps; expected exr, which gives it a panorama"
+        )
+    return FRAMES[convention]
+
+
+def _describe(shell: ShellMap, frame: Frame, files: list[str], format: str) -> dict[str, Any]:
+    panorama = format == "exr" and frame.panorama is not None
+    return {
+        "name": shell.name,
+        "proxy": move_proxy(shell.proxy, frame.space_matrix),
+        "projection": "latlong" if panorama else "cube",
+        "size": shell.size,
+        "levels": 1 if panorama else shell.levels,
+        "channels": shell.channels,
+        "files": files,
+    }
+
+
+def _write_shell(
+    shell: ShellMap, folder: Path, stem: str, frame: Frame, format: str, precision: str
+) -> tuple[list[str], int]:
+    """Write one map. Returns the names of its files and how many values were clamped."""
+    channels = ["R", "G", "B", "A"][: shell.channels]
+
+    def save(envmap: EnvMap, name: str, faces: str = "automatic") -> int:
+        return envmap.save(folder / name, faces=faces, format=precision).clamped_to_half
+
+    if format == "exr" and frame.panorama is not None:
+        finest = EnvMap.from_array(shell.level(0), "cube", channels)
+        panorama = finest.resample("latlong", 2 * shell.size, source_from_target=source_from_panorama(frame))
+        return [f"{stem}.exr"], save(panorama, f"{stem}.exr")
+    levels = [turn_cube(shell.level(i), frame.lookup_matrix) for i in range(shell.levels)]
+    if format == "exr":
+        names = [f"{stem}.level{i}.exr" for i in range(shell.levels)]
+        clamped = [
+            save(EnvMap.from_array(level, "cube", channels), name, "strip")
+            for level, name in zip(levels, names, strict=True)
+        ]
+        return names, sum(clamped)
+    values = np.concatenate([level.reshape(-1) for level in levels])
+    layout = _core.EnvMapLayout("cube", shell.size, shell.size, shell.levels, shell.channels)
+    return [f"{stem}.ktx2"], save(EnvMap(layout, values, channels), f"{stem}.ktx2")

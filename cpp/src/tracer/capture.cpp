@@ -19,7 +19,7 @@ Image Tracer::capture(glm::vec3 origin, const Projection& projection, int width,
   }
   tracing::validate(options);
   tracing::check_point("origin", origin);
-  const tracing::World& world = state_->world;
+  const tracing::World& world = state_->lit.world;
   const tracing::RayScene::View view = world.rays.without(hidden);
   const glm::vec3 eye = origin - world.rays.origin();
   const auto ray_through = [&](int row, glm::vec2 point) {
@@ -30,7 +30,7 @@ Image Tracer::capture(glm::vec3 origin, const Projection& projection, int width,
     return tracing::Ray{eye, glm::vec3(direction_from_point(projection, face, x, y))};
   };
   const PixelWindow whole{0, 0, width, face_count(projection) * height};
-  return trace_image(world, view, width, whole, options, ray_through);
+  return trace_image(state_->lit, view, width, whole, options, ray_through);
 }
 
 Image Tracer::capture_cube(glm::vec3 origin, int size, std::span<const int> hidden,

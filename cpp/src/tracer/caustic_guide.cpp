@@ -152,13 +152,14 @@ void CausticGuide::shoot_one(const World& world, const Hit& start, float area, c
   }
 }
 
-CausticGuide::Photons CausticGuide::shoot(const World& world, const SpecularTriangles& specular) {
+CausticGuide::Photons CausticGuide::shoot(const World& world, const SpecularTriangles& specular,
+                                          std::uint64_t seed) {
   constexpr std::size_t kChunk = 4096;
   const auto area = static_cast<float>(specular.area() / kPhotons);
   std::vector<Photons> chunks((kPhotons + kChunk - 1) / kChunk);
   parallel_for(kPhotons, kChunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const SampleStream stream = sample_stream(world.options.seed, 0, static_cast<std::uint32_t>(i));
+      const SampleStream stream = sample_stream(seed, 0, static_cast<std::uint32_t>(i));
       shoot_one(world, specular.sample(stream.get(0)), area, stream, chunks[begin / kChunk]);
     }
   });
@@ -254,10 +255,10 @@ void CausticGuide::fill(const std::vector<Photon>& photons, double irradiance_of
   }
 }
 
-CausticGuide::CausticGuide(const World& world) {
+CausticGuide::CausticGuide(const World& world, std::uint64_t seed) {
   const SpecularTriangles specular(world);
   if (!(specular.area() > 0.0) || world.lights.empty()) return;
-  const Photons photons = shoot(world, specular);
+  const Photons photons = shoot(world, specular, seed);
   if (photons.landed.empty()) return;
   lay_grid(photons.landed);
   if (size_.x > 0) fill(photons.landed, photons.received / specular.area());

@@ -25,7 +25,7 @@ class CausticGuide {
  public:
   /// Knows nothing.
   CausticGuide() = default;
-  explicit CausticGuide(const World& world);
+  CausticGuide(const World& world, std::uint64_t seed);
 
   /// Bins of directions: the octahedral map, cut into squares.
   static constexpr int kSide = 40;
@@ -72,7 +72,7 @@ class CausticGuide {
     double received = 0.0;  ///< power that falls on the specular surfaces, luminance, W
   };
 
-  static Photons shoot(const World& world, const SpecularTriangles& specular);
+  static Photons shoot(const World& world, const SpecularTriangles& specular, std::uint64_t seed);
   /// From a point of a specular surface that stands for `area`.
   static void shoot_one(const World& world, const Hit& start, float area, const SampleStream& stream,
                         Photons& photons);

@@ -4,8 +4,10 @@
 #include <map>
 #include <glm/geometric.hpp>
 
-#include "beauty.hpp"
 #include "camera_rays.hpp"
+#include "mirrorbake/core/parallel.hpp"
+#include "options.hpp"
+#include "primary_rays.hpp"
 #include "state.hpp"
 
 namespace mirrorbake {
@@ -37,7 +39,7 @@ Image Tracer::trace_geometry(const Camera& camera, const TraceOptions& options) 
   using namespace tracing;  // NOLINT: this function is all about it
   mirrorbake::validate(camera);
   tracing::validate(options);
-  const World& world = state_->world;
+  const World& world = state_->lit.world;
   const PixelWindow window = window_in(options, camera.width, camera.height);
   const CameraRays rays(camera);
   const glm::vec3 eye = camera.eye - world.rays.origin();

@@ -102,8 +102,8 @@ DirectLight direct_light(const World& world, const Surface& surface, glm::vec2 u
   return found;
 }
 
-bool diffuse_follows(const World& world, const PathLimits& limits) {
-  return world.options.indirect == IndirectLight::path && limits.diffuse_depth > 0;
+bool diffuse_follows(const LitWorld& lit, const PathLimits& limits) {
+  return lit.indirect.mode == IndirectLight::path && limits.diffuse_depth > 0;
 }
 
 bool specular_follows(const Surface& surface, const PathLimits& limits, int bounce) {
@@ -117,12 +117,13 @@ glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec
       .irradiance;
 }
 
-ScatteredLight scattered_light(const World& world, const Surface& surface, const PathLimits& limits,
+ScatteredLight scattered_light(const LitWorld& lit, const Surface& surface, const PathLimits& limits,
                                const SampleStream& stream, int bounce) {
+  const World& world = lit.world;
   const bool has_body = surface.albedo != glm::vec3(0.0F);
   const bool has_lobe = surface.rough() && specular_follows(surface, limits, bounce);
   if (!has_body && !has_lobe) return {};
-  const bool path = diffuse_follows(world, limits);
+  const bool path = diffuse_follows(lit, limits);
   const DirectLight direct =
       direct_light(world, surface, stream.get(dimension_base(bounce, 0) + light_dimension),
                    {.cosine = path, .lobe = true, .all = path}, has_lobe);
@@ -130,9 +131,9 @@ ScatteredLight scattered_light(const World& world, const Surface& surface, const
   light.lobe = direct.lobe;
   if (!has_body) return light;
   glm::vec3 irradiance = direct.irradiance;
-  if (world.options.indirect == IndirectLight::cached) irradiance += world.cache.irradiance(surface);
+  if (lit.indirect.mode == IndirectLight::cached) irradiance += lit.indirect.cache.irradiance(surface);
   light.body = surface.albedo * kInversePi * irradiance;
-  if (path) light.body += surface.albedo * diffuse_path_radiance(world, surface, limits, stream, bounce);
+  if (path) light.body += surface.albedo * diffuse_path_radiance(lit, surface, limits, stream, bounce);
   return light;
 }
 
@@ -174,17 +175,18 @@ glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, cons
   return power_heuristic(pdf, other) * surface.emission;
 }
 
-glm::vec3 radiance(const World& world, const Ray& first_ray, const Hit& first_hit, const PathLimits& limits,
+glm::vec3 radiance(const LitWorld& lit, const Ray& first_ray, const Hit& first_hit, const PathLimits& limits,
                    const SampleStream& stream, int bounce, float pdf) {
+  const World& world = lit.world;
   glm::vec3 sum(0.0F);
   glm::vec3 throughput(1.0F);
   Ray ray = first_ray;
   Hit hit = first_hit;
   for (;; ++bounce) {
     if (hit.missed() || world.is_light(hit))
-      return sum + throughput * emitted_light(world, ray, hit, pdf, diffuse_follows(world, limits));
+      return sum + throughput * emitted_light(world, ray, hit, pdf, diffuse_follows(lit, limits));
     const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
-    const ScatteredLight scattered = scattered_light(world, surface, limits, stream, bounce);
+    const ScatteredLight scattered = scattered_light(lit, surface, limits, stream, bounce);
     sum += throughput * (emitted_light(world, ray, hit, surface, pdf) + scattered.body);
     if (!specular_follows(surface, limits, bounce)) return sum;
     throughput *= surface.fresnel;
@@ -221,13 +223,14 @@ struct VertexNumbers {
 // Radiance of the lights that a guided ray finds by way of specular surfaces alone, as an estimate of π⁻¹ ×
 // irradiance. Weighted (power heuristic) for a partner that follows the cosine, `guided_partner_weight`.
 // `specular_bounces` were before.
-glm::vec3 guided_light(const World& world, const Surface& start, CausticGuide::Cell cell,
+glm::vec3 guided_light(const LitWorld& lit, const Surface& start, CausticGuide::Cell cell,
                        const PathLimits& limits, int specular_bounces, const VertexNumbers& numbers) {
+  const World& world = lit.world;
   const glm::vec2 u = numbers(guide_dimension);
   if (!(u.x < cell.rays)) return glm::vec3(0.0F);
-  const glm::vec3 direction = world.guide.sample(cell, {u.x / cell.rays, u.y});
+  const glm::vec3 direction = lit.indirect.guide.sample(cell, {u.x / cell.rays, u.y});
   const float pdf = cosine_pdf(start, direction);
-  const float guided = cell.rays * world.guide.pdf(cell, direction);
+  const float guided = cell.rays * lit.indirect.guide.pdf(cell, direction);
   if (!(pdf > 0.0F) || !(guided > 0.0F)) return glm::vec3(0.0F);
   glm::vec3 sum(0.0F);
   glm::vec3 throughput(pdf / guided * power_heuristic(guided, pdf));
@@ -258,16 +261,17 @@ glm::vec3 guided_light(const World& world, const Surface& start, CausticGuide::C
 }
 
 // Weight of what `guided_light` finds as well, for a ray along the cosine.
-float guided_partner_weight(const World& world, CausticGuide::Cell cell, glm::vec3 direction, float pdf) {
-  return cell.rays > 0.0F ? power_heuristic(pdf, cell.rays * world.guide.pdf(cell, direction)) : 1.0F;
+float guided_partner_weight(const LitWorld& lit, CausticGuide::Cell cell, glm::vec3 direction, float pdf) {
+  return cell.rays > 0.0F ? power_heuristic(pdf, cell.rays * lit.indirect.guide.pdf(cell, direction)) : 1.0F;
 }
 
 float brightest(glm::vec3 c) { return std::max(c.x, std::max(c.y, c.z)); }
 
 }  // namespace
 
-glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const PathLimits& limits,
+glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const PathLimits& limits,
                                 const SampleStream& stream, int bounce) {
+  const World& world = lit.world;
   glm::vec3 sum(0.0F);
   glm::vec3 throughput(1.0F);
   Surface surface = start;
@@ -282,10 +286,10 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
   int chain = 0;
   float chain_weight = 1.0F;
   const auto leave_diffuse = [&](const VertexNumbers& numbers) {
-    cell = world.guide.cell(surface.position);
+    cell = lit.indirect.guide.cell(surface.position);
     if (cell.rays > 0.0F) {
       cell.rays *= std::min(1.0F, brightest(throughput));
-      sum += throughput * guided_light(world, surface, cell, limits, specular_bounces, numbers);
+      sum += throughput * guided_light(lit, surface, cell, limits, specular_bounces, numbers);
     }
     direction = sample_cosine_hemisphere(Frame(surface.normal), numbers(diffuse_dimension));
     pdf = cosine_pdf(surface, direction);
@@ -308,7 +312,7 @@ glm::vec3 diffuse_path_radiance(const World& world, const Surface& start, const 
     const bool continue_diffuse = has_body && diffuse_bounces < limits.diffuse_depth;
     const bool continue_specular = specular_follows(surface, limits, specular_bounces);
     const bool has_lobe = surface.rough() && continue_specular;
-    if (continue_specular && chain == 0) chain_weight = guided_partner_weight(world, cell, direction, pdf);
+    if (continue_specular && chain == 0) chain_weight = guided_partner_weight(lit, cell, direction, pdf);
     if (chain == CausticGuide::kSpecularBounces) chain_weight = 1.0F;
     shared = continue_diffuse || !has_body;
     if (has_body || has_lobe) {

@@ -12,6 +12,7 @@
 namespace mirrorbake::tracing {
 
 struct World;
+struct LitWorld;
 
 /// What limits a path, from TraceOptions.
 struct PathLimits {
@@ -30,7 +31,7 @@ struct ScatteredLight {
 
 /// At the surface that is `bounce` specular bounces away from the eye. Shared by all integrators. `lobe` is 0
 /// unless the path goes on with a specular bounce.
-ScatteredLight scattered_light(const World& world, const Surface& surface, const PathLimits& limits,
+ScatteredLight scattered_light(const LitWorld& lit, const Surface& surface, const PathLimits& limits,
                                const SampleStream& stream, int bounce);
 
 /// A direction in the specular lobe. The radiance from there is multiplied with `weight` and
@@ -54,7 +55,7 @@ glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, cons
 /// The beauty integrator: radiance that arrives along `ray`, whose closest hit is `hit`, `bounce` specular
 /// bounces away from the eye, `pdf` the density of the ray's direction in a rough lobe (0: from the eye or a
 /// mirror). Reflections beyond the depth limit are black.
-glm::vec3 radiance(const World& world, const Ray& ray, const Hit& hit, const PathLimits& limits,
+glm::vec3 radiance(const LitWorld& lit, const Ray& ray, const Hit& hit, const PathLimits& limits,
                    const SampleStream& stream, int bounce, float pdf);
 
 /// Irradiance from all lights on the surface's side, by one sample of next-event estimation. With
@@ -63,7 +64,7 @@ glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec
 
 /// Radiance that a diffuse path finds which leaves `surface` in a random direction: an estimate of π⁻¹ ×
 /// irradiance. Includes the partner of `direct_irradiance` with `share_with_cosine`.
-glm::vec3 diffuse_path_radiance(const World& world, const Surface& surface, const PathLimits& limits,
+glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& surface, const PathLimits& limits,
                                 const SampleStream& stream, int bounce);
 
 }  // namespace mirrorbake::tracing

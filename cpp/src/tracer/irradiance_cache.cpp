@@ -31,9 +31,9 @@ IrradianceCache::~IrradianceCache() = default;
 IrradianceCache::IrradianceCache(IrradianceCache&&) noexcept = default;
 IrradianceCache& IrradianceCache::operator=(IrradianceCache&&) noexcept = default;
 
-IrradianceCache::IrradianceCache(const World& world) {
+IrradianceCache::IrradianceCache(const World& world, const TracerOptions& options) : seed_(options.seed) {
   assign_slots(world);
-  gather(world);
+  gather(world, options);
 }
 
 void IrradianceCache::assign_slots(const World& world) {
@@ -109,7 +109,7 @@ IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std
   std::array<Surface, kStartPoints> starts;
   const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
   for (std::uint32_t i = 0; i < start_count; ++i) {
-    const SampleStream stream = sample_stream(world.options.seed, number, i);
+    const SampleStream stream = sample_stream(seed_, number, i);
     const TriangleCorner& corner = corners_[first + i % count];
     const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
     starts[i] = surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), side == 0 ? n : -n);
@@ -126,7 +126,7 @@ IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std
       break;
     }
     const auto index = static_cast<std::uint32_t>(r);
-    const SampleStream stream = sample_stream(world.options.seed, number, index);
+    const SampleStream stream = sample_stream(seed_, number, index);
     const Surface& start = starts[index % start_count];
     const glm::vec3 direction =
         sample_cosine_hemisphere(Frame(start.normal), stream.get(dimension_base(0, 0) + diffuse_dimension));
@@ -143,7 +143,7 @@ IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std
   return result;
 }
 
-void IrradianceCache::gather(const World& world) {
+void IrradianceCache::gather(const World& world, const TracerOptions& options) {
   const std::size_t slots = first_corner_.size() - 1;
   std::vector<std::uint8_t> buried[2];
   std::vector<std::uint8_t> given_up[2];
@@ -154,12 +154,12 @@ void IrradianceCache::gather(const World& world) {
   }
 
   Sides previous;
-  for (int pass = 0; pass < world.options.cache_bounces; ++pass) {
+  for (int pass = 0; pass < options.cache_bounces; ++pass) {
     const auto direct = [&](const Surface& s, glm::vec2 u) { return direct_irradiance(world, s, u, false); };
     const auto indirect = [&](const Surface& s, glm::vec2) { return interpolate(previous, s); };
-    const int rays = pass == 0 ? world.options.cache_rays
-                               : std::max(world.options.cache_rays / kLaterShare,
-                                          std::min(world.options.cache_rays, kProbeRays));
+    const int rays =
+        pass == 0 ? options.cache_rays
+                  : std::max(options.cache_rays / kLaterShare, std::min(options.cache_rays, kProbeRays));
     Sides found;
     for (int side = 0; side < 2; ++side) {
       found.side[side].assign(slots, glm::vec3(0.0F));

@@ -4,6 +4,7 @@
 #include <vector>
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/tracer/tracer.hpp"
 #include "surface.hpp"
 
 namespace mirrorbake::tracing {
@@ -21,7 +22,7 @@ struct TriangleCorner;
 class IrradianceCache {
  public:
   IrradianceCache();
-  explicit IrradianceCache(const World& world);
+  IrradianceCache(const World& world, const TracerOptions& options);
   ~IrradianceCache();
   IrradianceCache(IrradianceCache&&) noexcept;
   IrradianceCache& operator=(IrradianceCache&&) noexcept;
@@ -49,7 +50,7 @@ class IrradianceCache {
   SlotGather gather_slot(const World& world, std::size_t slot, int side, int rays,
                          const IrradianceAt& irradiance_at) const;
   /// Adds up what the passes bring.
-  void gather(const World& world);
+  void gather(const World& world, const TracerOptions& options);
   void fill_buried(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
 
   /// Slot of each triangle corner, three per triangle, per object; empty for objects without diffuse
@@ -59,6 +60,7 @@ class IrradianceCache {
   std::vector<std::uint32_t> first_corner_;
   std::vector<TriangleCorner> corners_;
   Sides total_;
+  std::uint64_t seed_ = 0;
 };
 
 }  // namespace mirrorbake::tracing

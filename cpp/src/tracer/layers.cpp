@@ -10,13 +10,14 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
-#include "beauty.hpp"
 #include "camera_rays.hpp"
 #include "integrator.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "options.hpp"
+#include "primary_rays.hpp"
+#include "progress.hpp"
 #include "state.hpp"
 
 namespace mirrorbake {
@@ -24,6 +25,7 @@ namespace {
 
 using tracing::CameraRays;
 using tracing::Hit;
+using tracing::LitWorld;
 using tracing::PathLimits;
 using tracing::PrimaryRow;
 using tracing::PrimarySample;
@@ -138,9 +140,10 @@ void record_light(SurfaceSamples& out, glm::vec3 body, const SpecularLayers& spe
 }
 
 /// `lobe` is what next-event estimation found for the lobe.
-SpecularLayers trace_specular(const World& world, const RayScene::View& without_reflector,
+SpecularLayers trace_specular(const LitWorld& lit, const RayScene::View& without_reflector,
                               const Surface& surface, glm::vec3 lobe, const PathLimits& limits,
                               const SampleStream& stream) {
+  const World& world = lit.world;
   SpecularLayers layers;
   layers.distant = lobe;
   const tracing::SpecularBounce bounce = tracing::specular_bounce(surface, stream, 0);
@@ -148,12 +151,12 @@ SpecularLayers trace_specular(const World& world, const RayScene::View& without_
   const Ray ray{tracing::offset_origin(surface, bounce.direction), bounce.direction};
   Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
   if (meets(hit, surface.object)) {
-    const glm::vec3 incident = tracing::radiance(world, ray, hit, limits, stream, 1, bounce.pdf);
+    const glm::vec3 incident = tracing::radiance(lit, ray, hit, limits, stream, 1, bounce.pdf);
     layers.local = glm::vec4(lobe + bounce.weight * incident, 1.0F);
     layers.local_distance = hit.distance;
     hit = without_reflector.intersect(ray, RayKind::reflection);
   }
-  layers.distant += bounce.weight * tracing::radiance(world, ray, hit, limits, stream, 1, bounce.pdf);
+  layers.distant += bounce.weight * tracing::radiance(lit, ray, hit, limits, stream, 1, bounce.pdf);
   layers.distant_distance = hit.distance;
   return layers;
 }
@@ -332,7 +335,8 @@ LayerTrace Tracer::trace_layers(const Camera& camera, int reflector, const Trace
 
 std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<const int> reflectors,
                                              const TraceOptions& options) const {
-  const World& world = state_->world;
+  const LitWorld& lit = state_->lit;
+  const World& world = lit.world;
   validate(camera);
   tracing::validate(options);
   const PixelWindow window = tracing::window_in(options, camera.width, camera.height);
@@ -369,7 +373,7 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
         for (int i = 0; i < options.samples_per_pixel; ++i) {
           const PrimarySample& sample = primary.next();
           const glm::vec3 value =
-              tracing::radiance(world, sample.ray, sample.hit, limits, sample.stream, 0, 0.0F);
+              tracing::radiance(lit, sample.ray, sample.hit, limits, sample.stream, 0, 0.0F);
           beauty += glm::dvec3(value);
           if (sample.hit.missed() || world.is_light(sample.hit)) continue;
           const int number = number_of_object[sample.hit.geometry];
@@ -378,10 +382,10 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
           const Surface surface =
               tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
           const tracing::ScatteredLight scattered =
-              tracing::scattered_light(world, surface, limits, sample.stream, 0);
+              tracing::scattered_light(lit, surface, limits, sample.stream, 0);
           const glm::vec3 body = surface.emission + scattered.body;
           const SpecularLayers specular =
-              trace_specular(world, without[r], surface, scattered.lobe, limits, sample.stream);
+              trace_specular(lit, without[r], surface, scattered.lobe, limits, sample.stream);
           SurfaceSamples& out = rows[r][y].samples;
           record_surface(out, world, surface, sample.hit.distance,
                          rays.direction_with_differentials(sample.point), pixel_number(window, y, x));
@@ -411,7 +415,7 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
 SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
                                         const TraceOptions& trace_options,
                                         std::span<const glm::vec2> places) const {
-  const World& world = state_->world;
+  const World& world = state_->lit.world;
   validate(camera);
   TraceOptions options = trace_options;
   if (!places.empty()) {

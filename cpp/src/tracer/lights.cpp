@@ -117,198 +117,90 @@ std::optional<LightSample> towards(glm::vec3 point, glm::vec3 position) {
 
 }  // namespace
 
-EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
-    : panorama_(&light.panorama), scale_(light.scale) {
-  const double angle = static_cast<double>(light.rotation_degrees) * std::numbers::pi / 180.0;
-  cosine_ = static_cast<float>(std::cos(angle));
-  sine_ = static_cast<float>(std::sin(angle));
-
-  const int width = panorama_->width;
-  const int height = panorama_->height;
-  const auto value = [&](int x, int y) {
-    const float* p = panorama_->at((x + width) % width, std::clamp(y, 0, height - 1));
-    return static_cast<double>(scale_) * static_cast<double>(luminance({p[0], p[1], p[2]}));
-  };
-  const auto w = static_cast<std::size_t>(width);
-  for (int y = 0; y <= height; ++y) row_cosine_.push_back(std::cos(std::numbers::pi * y / height));
-  std::vector<float> means(w * static_cast<std::size_t>(height));
-  for (int y = 0; y < height; ++y) {
-    // Mean of the bilinear interpolant over the texel: weights 1/8, 3/4, 1/8 each way. The density by luminance is
-    // positive wherever the radiance is.
-    for (int x = 0; x < width; ++x) {
-      double mean = 0.0;
-      for (int j = -1; j <= 1; ++j) {
-        for (int i = -1; i <= 1; ++i) {
-          mean += (i == 0 ? 0.75 : 0.125) * (j == 0 ? 0.75 : 0.125) * value(x + i, y + j);
-        }
-      }
-      means[static_cast<std::size_t>(y) * w + static_cast<std::size_t>(x)] = static_cast<float>(mean);
-    }
-  }
-  by_luminance_ = distribution(means, 0.0);
-  by_excess_ = distribution(means, by_luminance_.flux / (4.0 * std::numbers::pi));
-  if (!(by_excess_.flux > 0.0)) by_excess_ = by_luminance_;  // an even sky
-}
-
-EnvironmentSampler::Distribution EnvironmentSampler::distribution(const std::vector<float>& luminance,
-                                                                  double threshold) const {
-  const auto width = static_cast<std::size_t>(panorama_->width);
-  const auto height = static_cast<std::size_t>(panorama_->height);
-  Distribution d;
-  d.row_cdf.resize(height + 1);
-  d.column_cdf.resize(height * (width + 1));
-  std::vector<double> row_sums(height);
-  std::vector<double> row(width);
-  for (std::size_t y = 0; y < height; ++y) {
-    for (std::size_t x = 0; x < width; ++x) {
-      row[x] = std::max(0.0, static_cast<double>(luminance[y * width + x]) - threshold);
-    }
-    const double sum = normalise_cdf(&d.column_cdf[y * (width + 1)], row.data(), panorama_->width);
-    row_sums[y] = sum * (row_cosine_[y] - row_cosine_[y + 1]) * 2.0 * std::numbers::pi / panorama_->width;
-  }
-  d.flux = normalise_cdf(d.row_cdf.data(), row_sums.data(), panorama_->height);
-  return d;
-}
-
-glm::vec3 EnvironmentSampler::radiance(glm::vec2 uv) const {
-  const int width = panorama_->width;
-  const int height = panorama_->height;
-  const float x = uv.x * static_cast<float>(width) - 0.5F;
-  const float y = uv.y * static_cast<float>(height) - 0.5F;
-  const auto x0 = static_cast<int>(std::floor(x));
-  const auto y0 = static_cast<int>(std::floor(y));
-  const float fx = x - static_cast<float>(x0);
-  const float fy = y - static_cast<float>(y0);
-  const auto texel = [&](int i, int j) {
-    if (i < 0) i += width;
-    if (i >= width) i -= width;
-    const float* p = panorama_->at(i, std::clamp(j, 0, height - 1));
-    return glm::vec3(p[0], p[1], p[2]);
-  };
-  return scale_ * ((1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
-                   fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1)));
-}
-
-float EnvironmentSampler::pdf(const Distribution& d, int x, int y) const {
-  const auto edge = static_cast<std::size_t>(y);
-  const int width = panorama_->width;
-  const float* row = &d.column_cdf[edge * (static_cast<std::size_t>(width) + 1)];
-  const float probability = (d.row_cdf[edge + 1] - d.row_cdf[edge]) * (row[x + 1] - row[x]);
-  // Samples are uniform in solid angle within a texel.
-  const double solid_angle = (row_cosine_[edge] - row_cosine_[edge + 1]) * 2.0 * std::numbers::pi / width;
-  return static_cast<float>(probability / solid_angle);
-}
-
-EnvironmentSampler::Found EnvironmentSampler::find(glm::vec3 direction, bool shared) const {
-  // Undo the rotation about +Y, then: the centre is −Z, +X to its right.
-  const float x = cosine_ * direction.x - sine_ * direction.z;
-  const float z = sine_ * direction.x + cosine_ * direction.z;
-  // acos(y) loses half its digits at the poles.
-  const glm::vec2 uv(std::clamp(0.5F + std::atan2(x, -z) / (2.0F * kPi), 0.0F, 1.0F),
-                     std::clamp(std::atan2(std::sqrt(x * x + z * z), direction.y) / kPi, 0.0F, 1.0F));
-  const int width = panorama_->width;
-  const int height = panorama_->height;
-  return {radiance(uv), pdf(shared ? by_excess_ : by_luminance_,
-                            std::min(static_cast<int>(uv.x * static_cast<float>(width)), width - 1),
-                            std::min(static_cast<int>(uv.y * static_cast<float>(height)), height - 1))};
-}
-
-EnvironmentSampler::Sample EnvironmentSampler::sample(glm::vec2 u, bool shared) const {
-  const Distribution& d = shared ? by_excess_ : by_luminance_;
-  const int width = panorama_->width;
-  const int height = panorama_->height;
-  const CdfSample row = sample_cdf(d.row_cdf.data(), height, u.y);
-  const auto edge = static_cast<std::size_t>(row.index);
-  const CdfSample column =
-      sample_cdf(&d.column_cdf[edge * (static_cast<std::size_t>(width) + 1)], width, u.x);
-  const float across = (static_cast<float>(column.index) + column.place) / static_cast<float>(width);
-  const double y = row_cosine_[edge] + row.place * (row_cosine_[edge + 1] - row_cosine_[edge]);
-  const auto radius = static_cast<float>(std::sqrt(std::max(0.0, (1.0 - y) * (1.0 + y))));
-  const float azimuth = 2.0F * kPi * (across - 0.5F);
-  const float x = radius * std::sin(azimuth);
-  const float z = -radius * std::cos(azimuth);
-  const glm::vec3 direction(cosine_ * x + sine_ * z, y, -sine_ * x + cosine_ * z);
-  const glm::vec2 uv(across, std::atan2(radius, direction.y) / kPi);
-  return {glm::normalize(direction), {radiance(uv), pdf(d, column.index, row.index)}};
-}
-
 Lights::Lights(const Scene& scene, const RayScene& rays)
     : scene_(&scene),
       rays_(&rays),
       meshes_(scene.objects.size()),
       mesh_probability_(scene.objects.size()),
       hit_probability_(scene.rectangle_lights.size() + scene.sphere_lights.size()) {
-  for (std::size_t i = 0; i < scene.rectangle_lights.size(); ++i) {
-    const RectangleLight& light = scene.rectangle_lights[i];
-    Rectangle r;
-    r.corner = light.corner - rays.origin();
-    r.edge_u = light.edge_u;
-    r.edge_v = light.edge_v;
-    const glm::dvec3 normal = glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v));
-    r.area = static_cast<float>(glm::length(normal));
-    r.normal = glm::vec3(glm::normalize(normal));
-    r.centre = r.corner + 0.5F * (r.edge_u + r.edge_v);
-    r.diagonal = glm::length(r.edge_u + r.edge_v);
-    r.orthogonal =
-        std::abs(glm::dot(r.edge_u, r.edge_v)) <= 1e-5F * glm::length(r.edge_u) * glm::length(r.edge_v);
-    r.radiance = light.radiance;
-    r.width = glm::length(glm::dvec3(light.edge_u));
-    r.height = glm::length(glm::dvec3(light.edge_v));
-    r.unit_u = glm::dvec3(light.edge_u) / r.width;
-    r.unit_v = glm::dvec3(light.edge_v) / r.height;
-    rectangles_.push_back(r);
-    add(Kind::rectangle, static_cast<int>(i), static_cast<double>(luminance(light.radiance) * r.area * kPi));
-  }
-  const auto add_light = [&](Kind kind, std::size_t i, glm::vec3 strength, double power) {
-    add(kind, static_cast<int>(i), static_cast<double>(luminance(strength)) * power);
-  };
   const double scene_disk =
       std::numbers::pi * static_cast<double>(rays.radius()) * static_cast<double>(rays.radius());
-  for (std::size_t i = 0; i < scene.sphere_lights.size(); ++i) {
-    const SphereLight& light = scene.sphere_lights[i];
-    spheres_.push_back({light.centre - rays.origin(), light.radiance, light.radius});
-    const double radius = light.radius;
-    add_light(Kind::sphere, i, light.radiance, 4.0 * std::numbers::pi * std::numbers::pi * radius * radius);
-  }
+  for (std::size_t i = 0; i < scene.rectangle_lights.size(); ++i) add_rectangle(i);
+  for (std::size_t i = 0; i < scene.sphere_lights.size(); ++i) add_sphere(i);
   for (std::size_t i = 0; i < scene.point_lights.size(); ++i) {
     const PointLight& light = scene.point_lights[i];
     points_.push_back({light.position - rays.origin(), light.intensity});
-    add_light(Kind::point, i, light.intensity, 4.0 * std::numbers::pi);
+    add(Kind::point, i, light.intensity, 4.0 * std::numbers::pi);
   }
   for (std::size_t i = 0; i < scene.directional_lights.size(); ++i) {
-    add_light(Kind::directional, i, scene.directional_lights[i].irradiance, scene_disk);
+    add(Kind::directional, i, scene.directional_lights[i].irradiance, scene_disk);
   }
   for (std::size_t i = 0; i < scene.spot_lights.size(); ++i) {
     const SpotLight& light = scene.spot_lights[i];
     spots_.push_back({light.position - rays.origin(), light.intensity});
     const double cone = 1.0 - std::cos(static_cast<double>(light.outer_degrees) * std::numbers::pi / 180.0);
-    add_light(Kind::spot, i, light.intensity, 2.0 * std::numbers::pi * cone);
+    add(Kind::spot, i, light.intensity, 2.0 * std::numbers::pi * cone);
   }
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const Material& material = scene.materials[static_cast<std::size_t>(scene.objects[i].material)];
-    glm::vec3 emission = material.emission;
-    if (luminance(emission) > 0.0F && material.emission_texture.texture >= 0) {
-      emission *= texture_mean(scene.textures[static_cast<std::size_t>(material.emission_texture.texture)]);
-    }
-    if (luminance(emission) <= 0.0F) continue;
-    const TriangleMesh& mesh = scene.objects[i].mesh;
-    std::vector<double> areas;
-    for (const glm::uvec3& t : mesh.triangles) {
-      const glm::dvec3 a = mesh.positions[t.x];
-      areas.push_back(0.5 * glm::length(glm::cross(glm::dvec3(mesh.positions[t.y]) - a,
-                                                   glm::dvec3(mesh.positions[t.z]) - a)));
-    }
-    meshes_[i].area_cdf.resize(areas.size() + 1);
-    meshes_[i].area = static_cast<float>(
-        normalise_cdf(meshes_[i].area_cdf.data(), areas.data(), static_cast<int>(areas.size())));
-    meshes_[i].is_reflected = (scene.objects[i].visibility & Visibility::reflection) != Visibility::none;
-    add(Kind::mesh, static_cast<int>(i), static_cast<double>(luminance(emission) * meshes_[i].area * kPi));
-  }
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) add_mesh(i);
   if (scene.environment) {
     environment_.emplace(*scene.environment);
-    if (environment_->flux() > 0.0) add(Kind::environment, 0, environment_->flux() * scene_disk);
+    add(Kind::environment, 0, environment_->flux() * scene_disk);
   }
+  assign_probabilities();
+}
 
+void Lights::add_rectangle(std::size_t i) {
+  const RectangleLight& light = scene_->rectangle_lights[i];
+  Rectangle r;
+  r.corner = light.corner - rays_->origin();
+  r.edge_u = light.edge_u;
+  r.edge_v = light.edge_v;
+  const glm::dvec3 normal = glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v));
+  r.area = static_cast<float>(glm::length(normal));
+  r.normal = glm::vec3(glm::normalize(normal));
+  r.centre = r.corner + 0.5F * (r.edge_u + r.edge_v);
+  r.diagonal = glm::length(r.edge_u + r.edge_v);
+  r.orthogonal =
+      std::abs(glm::dot(r.edge_u, r.edge_v)) <= 1e-5F * glm::length(r.edge_u) * glm::length(r.edge_v);
+  r.radiance = light.radiance;
+  r.width = glm::length(glm::dvec3(light.edge_u));
+  r.height = glm::length(glm::dvec3(light.edge_v));
+  r.unit_u = glm::dvec3(light.edge_u) / r.width;
+  r.unit_v = glm::dvec3(light.edge_v) / r.height;
+  rectangles_.push_back(r);
+  add(Kind::rectangle, i, static_cast<double>(luminance(light.radiance) * r.area * kPi));
+}
+
+void Lights::add_sphere(std::size_t i) {
+  const SphereLight& light = scene_->sphere_lights[i];
+  spheres_.push_back({light.centre - rays_->origin(), light.radiance, light.radius});
+  const double radius = light.radius;
+  add(Kind::sphere, i, light.radiance, 4.0 * std::numbers::pi * std::numbers::pi * radius * radius);
+}
+
+void Lights::add_mesh(std::size_t i) {
+  const Object& object = scene_->objects[i];
+  const Material& material = scene_->materials[static_cast<std::size_t>(object.material)];
+  glm::vec3 emission = material.emission;
+  if (luminance(emission) > 0.0F && material.emission_texture.texture >= 0) {
+    emission *= texture_mean(scene_->textures[static_cast<std::size_t>(material.emission_texture.texture)]);
+  }
+  if (luminance(emission) <= 0.0F) return;
+  std::vector<double> areas;
+  for (const glm::uvec3& t : object.mesh.triangles) {
+    const glm::dvec3 a = object.mesh.positions[t.x];
+    areas.push_back(0.5 * glm::length(glm::cross(glm::dvec3(object.mesh.positions[t.y]) - a,
+                                                 glm::dvec3(object.mesh.positions[t.z]) - a)));
+  }
+  Mesh& mesh = meshes_[i];
+  mesh.area_cdf.resize(areas.size() + 1);
+  mesh.area =
+      static_cast<float>(normalise_cdf(mesh.area_cdf.data(), areas.data(), static_cast<int>(areas.size())));
+  mesh.is_reflected = (object.visibility & Visibility::reflection) != Visibility::none;
+  add(Kind::mesh, i, static_cast<double>(luminance(emission) * mesh.area * kPi));
+}
+
+void Lights::assign_probabilities() {
   double total = 0.0;
   for (const Light& light : lights_) total += light.power;
   std::vector<double> shares;
@@ -329,8 +221,12 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
   }
 }
 
-void Lights::add(Kind kind, int index, double power) {
-  if (power > 0.0) lights_.push_back({kind, index, power});
+void Lights::add(Kind kind, std::size_t index, double power) {
+  if (power > 0.0) lights_.push_back({kind, static_cast<int>(index), power});
+}
+
+void Lights::add(Kind kind, std::size_t index, glm::vec3 strength, double power) {
+  add(kind, index, static_cast<double>(luminance(strength)) * power);
 }
 
 std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u, bool shared) const {

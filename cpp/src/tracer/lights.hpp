@@ -5,6 +5,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "environment_sampler.hpp"
 #include "mirrorbake/scene/scene.hpp"
 #include "ray_scene.hpp"
 
@@ -17,46 +18,6 @@ struct LightSample {
   glm::vec3 radiance{0.0F};  ///< divided by the density: a sum over samples times the cosine gives irradiance
   float pdf =
       0.0F;  ///< density per solid angle of this direction; 0 if rays that are followed cannot find the light
-};
-
-/// The environment light: bilinear lookup and sampling by luminance.
-class EnvironmentSampler {
- public:
-  explicit EnvironmentSampler(const EnvironmentLight& light);
-
-  /// What is found in a direction.
-  struct Found {
-    glm::vec3 radiance;
-    float pdf;  ///< density per solid angle with which `sample` takes the direction
-  };
-  /// `shared`: see Lights.
-  Found find(glm::vec3 direction, bool shared) const;
-  struct Sample {
-    glm::vec3 direction;  ///< unit
-    Found found;
-  };
-  Sample sample(glm::vec2 u, bool shared) const;
-  /// ∫ luminance dω.
-  double flux() const { return by_luminance_.flux; }
-
- private:
-  glm::vec3 radiance(glm::vec2 uv) const;
-  struct Distribution {
-    std::vector<float> row_cdf;     ///< height + 1
-    std::vector<float> column_cdf;  ///< height × (width + 1)
-    double flux = 0.0;              ///< ∫ of what it is made from
-  };
-  /// Of the texels' luminance above `threshold`.
-  Distribution distribution(const std::vector<float>& luminance, double threshold) const;
-  float pdf(const Distribution& d, int x, int y) const;  ///< in a texel
-
-  const Image* panorama_;
-  float scale_;
-  float cosine_;  ///< of the rotation
-  float sine_;
-  std::vector<double> row_cosine_;  ///< height + 1: cosines of the rows' edges to +Y
-  Distribution by_luminance_;
-  Distribution by_excess_;  ///< above the average; for shared directions
 };
 
 /// All lights of a scene, one of which is picked per sample with a probability that mixes equal shares with
@@ -111,7 +72,13 @@ class Lights {
     glm::vec3 position, intensity;
   };
 
-  void add(Kind kind, int index, double power);
+  void add(Kind kind, std::size_t index, double power);
+  /// `power` for a strength of luminance 1.
+  void add(Kind kind, std::size_t index, glm::vec3 strength, double power);
+  void add_rectangle(std::size_t i);
+  void add_sphere(std::size_t i);
+  void add_mesh(std::size_t i);
+  void assign_probabilities();
   std::optional<LightSample> sample_rectangle(const Rectangle& r, glm::vec3 position, glm::vec2 u) const;
   std::optional<LightSample> sample_mesh(int object, glm::vec3 position, glm::vec2 u) const;
 

@@ -7,7 +7,7 @@ namespace mirrorbake {
 struct Tracer::State {
   State(Scene scene, const TracerOptions& options);
 
-  tracing::World world;
+  tracing::LitWorld lit;
 
   /// Throws InvalidArgument unless the arguments are usable.
   void check_object(const char* argument, int object) const;

@@ -13,7 +13,8 @@ std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint
   using namespace tracing;  // NOLINT: this function is all about it
   state_->check_object("object", object);
   check_range("rays", rays, 1, 65536);
-  const World& world = state_->world;
+  const World& world = state_->lit.world;
+  const Indirect& indirect = state_->lit.indirect;
   const TriangleMesh& mesh = world.scene.objects[static_cast<std::size_t>(object)].mesh;
 
   // The triangle corners at each vertex.
@@ -30,11 +31,11 @@ std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint
     }
   }
 
-  const bool path = world.options.indirect == IndirectLight::path;
-  const bool cached = world.options.indirect == IndirectLight::cached;
+  const bool path = indirect.mode == IndirectLight::path;
+  const bool cached = indirect.mode == IndirectLight::cached;
   const PathLimits limits{TraceOptions{}.max_specular_depth, TraceOptions{}.max_diffuse_depth};
   const auto irradiance_at = [&](const Surface& surface, glm::vec2 u) {
-    return direct_irradiance(world, surface, u, false) + world.cache.irradiance(surface);
+    return direct_irradiance(world, surface, u, false) + indirect.cache.irradiance(surface);
   };
   std::vector<glm::vec3> irradiance(mesh.positions.size(), glm::vec3(0.0F));
   parallel_for(irradiance.size(), 32, [&](std::size_t begin, std::size_t end) {
@@ -51,7 +52,7 @@ std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint
         const Surface start = surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), n);
         glm::vec3 found = direct_irradiance(world, start, stream.get(light_dimension), path);
         if (path) {
-          found += std::numbers::pi_v<float> * diffuse_path_radiance(world, start, limits, stream, 1);
+          found += std::numbers::pi_v<float> * diffuse_path_radiance(state_->lit, start, limits, stream, 1);
         } else if (cached) {
           const glm::vec3 direction =
               sample_cosine_hemisphere(Frame(start.normal), stream.get(diffuse_dimension));

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <memory>
 #include <span>
+#include <utility>
 #include <glm/geometric.hpp>
 
 #include "caustic_guide.hpp"
@@ -13,19 +13,15 @@
 
 namespace mirrorbake::tracing {
 
-/// All that is prepared once per scene.
+/// What rays and lights are prepared from, once per scene.
 struct World {
-  World(Scene scene_, const TracerOptions& options_)
-      : scene(std::move(scene_)), options(options_), rays(scene), lights(scene, rays) {}
+  explicit World(Scene scene_) : scene(std::move(scene_)), rays(scene), lights(scene, rays) {}
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
   Scene scene;
-  TracerOptions options;
   RayScene rays;
   Lights lights;
-  IrradianceCache cache;  ///< empty unless options.indirect is `cached`
-  CausticGuide guide;     ///< empty unless options.indirect is `path`
 
   bool is_light(const Hit& hit) const { return hit.geometry >= scene.objects.size(); }
   /// Number of a light's hit among the rectangle lights, then the sphere lights.
@@ -47,6 +43,26 @@ struct World {
     const SphereLight& light = scene.sphere_lights[number - scene.rectangle_lights.size()];
     return glm::normalize(ray.origin + hit.distance * ray.direction - (light.centre - rays.origin()));
   }
+};
+
+/// How light gets about that diffuse surfaces pass on.
+struct Indirect {
+  Indirect(const World& world, const TracerOptions& options)
+      : mode(options.indirect),
+        cache(mode == IndirectLight::cached ? IrradianceCache(world, options) : IrradianceCache()),
+        guide(mode == IndirectLight::path ? CausticGuide(world, options.seed) : CausticGuide()) {}
+
+  IndirectLight mode;
+  IrradianceCache cache;  ///< empty unless the mode is `cached`
+  CausticGuide guide;     ///< empty unless the mode is `path`
+};
+
+/// All that the integrators need.
+struct LitWorld {
+  LitWorld(Scene scene, const TracerOptions& options) : world(std::move(scene)), indirect(world, options) {}
+
+  World world;
+  Indirect indirect;
 };
 
 }  // namespace mirrorbake::tracing

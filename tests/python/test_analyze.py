@@ -105,7 +105,7 @@ def beauty(stage: Stage, depth: int) -> Any:
     options = _core.TraceOptions(samples_per_pixel=4, max_specular_depth=depth)
     pictures = []
     for t in (0.0, 0.5, 1.0):
-        trace = stage.tracer.trace_layers(stage.built.arc.camera(t), stage.built.reflector, options)
+        trace = stage.tracer.trace_layers(stage.built.cameras.camera((t,)), stage.built.reflector, options)
         channels = list(trace.channels)
         layers = np.asarray(trace.layers)
         seen = layers[..., channels.index("coverage")] > 0.5

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -164,20 +163,6 @@ def test_between_two_views_the_maps_are_blended_linearly(baked: Baked) -> None:
     np.testing.assert_allclose(blended, expected, rtol=1e-5, atol=1e-6)
 
 
-def test_a_sampled_parameter_uses_one_view_even_if_it_was_rounded(baked: Baked) -> None:
-    run_time = baked.open().run_time
-    assert run_time.neighbours(0.0) == (0, 0, 0.0)
-    assert run_time.neighbours(0.5) == (1, 1, 0.0)
-    assert run_time.neighbours(0.4999999) == (1, 1, 0.0)
-    assert run_time.neighbours(1.0) == (2, 2, 0.0)
-    first, second, weight = run_time.neighbours(0.6)
-    assert (first, second) == (1, 2)
-    assert weight == pytest.approx(0.2)
-    for t in (-0.01, 1.01, math.nan):
-        with pytest.raises(InputError, match="from 0 to 1"):
-            run_time.neighbours(t)
-
-
 def test_the_stored_reference_is_what_is_traced_again(baked: Baked) -> None:
     stored = PemStore.open(baked.directory).read_images(1)
     traced = images_of_trace(baked.stage.trace(0.5))
@@ -324,3 +309,27 @@ def test_the_demonstration_is_the_teapot_at_one_degree() -> None:
     config = demo_config()
     assert config.reflector.subdivisions == 25
     assert config.views.degrees / (config.views.count - 1) == 1.0
+
+
+def test_a_sample_has_the_same_bits_baked_alone_or_in_any_order_with_any_threads(tmp_path: Path) -> None:
+    config = parse_config(
+        {**SMALL, "maps": {"size": 16}, "views": {"count": 3, "degrees": 20.0, "size": [40, 30]}}, "order"
+    )
+
+    def maps(name: str, orders: list[list[int]], threads: int) -> list[bytes]:
+        with _core.ThreadLimit(threads):
+            for order in orders:
+                bake(config, tmp_path / name, samples=order)
+        store = PemStore.open(tmp_path / name)
+        return [
+            store.read_map(*map_name, index).tobytes() if store.completed()[index] else b""
+            for index in range(3)
+            for map_name in store.header.map_names()
+        ]
+
+    everything = maps("whole", [[0, 1, 2]], 1)
+    assert all(everything)
+    assert maps("backwards", [[2], [1], [0]], 2) == everything
+    assert maps("apart", [[1], [0, 2]], 8) == everything
+    per_sample = len(everything) // 3
+    assert maps("alone", [[1]], 2)[per_sample : 2 * per_sample] == everything[per_sample : 2 * per_sample]

@@ -10,6 +10,7 @@ import pytest
 from mirrorbake.errors import InputError
 from mirrorbake.scene.config import PATH_KEYS, SceneConfig
 from mirrorbake.scene.load import load_config, parse_config, parse_override
+from mirrorbake.scene.parameters import space_of
 from mirrorbake.scene.plan import DECIDED_KEYS
 
 
@@ -114,8 +115,9 @@ def test_one_number_stands_for_all_three_channels() -> None:
 
 
 def test_views_are_spread_evenly_from_0_to_1() -> None:
-    assert parse_config({"views": {"count": 5}}, "scene").views.parameters() == [0, 0.25, 0.5, 0.75, 1]
-    assert parse_config({"views": {"count": 1}}, "scene").views.parameters() == [0]
+    five, one = (space_of(parse_config({"views": {"count": n}}, "scene")).samples() for n in (5, 1))
+    assert five == [(0,), (0.25,), (0.5,), (0.75,), (1,)]
+    assert one == [(0,)]
 
 
 def test_a_config_survives_the_way_through_json() -> None:
@@ -219,7 +221,8 @@ def test_a_missing_scene_file_is_named(tmp_path: Path) -> None:
 def test_every_key_of_the_scene_file_is_in_its_reference_page(request: pytest.FixtureRequest) -> None:
     page = request.config.rootpath / "docs" / "reference" / "scene-toml.md"
     text = page.read_text(encoding="utf-8")
-    config = parse_config({"material": {}}, "scene")
+    sections = {"material": {}, "motion": {"turn": 1}, "light": {}, "surroundings": {"panorama": "/sky.exr"}}
+    config = parse_config(sections, "scene")
     for section in SceneConfig.model_fields:
         assert f"`[{section}]`" in text
         for key in type(getattr(config, section)).model_fields:

@@ -31,8 +31,9 @@ from mirrorbake.evaluate.references import (
 )
 from mirrorbake.evaluate.table import metrics_tables
 from mirrorbake.pem.opened import OpenedPem, open_pem
+from mirrorbake.scene.cameras import Cameras
 from mirrorbake.scene.load import parse_config
-from mirrorbake.scene.parameters import Arc
+from mirrorbake.scene.parameters import Axis, ParameterSpace
 from mirrorbake.scene.stage import Stage, prepare_stage
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def reseeded(stage: Stage, seed: int) -> Stage:
 
 
 def test_noise_falls_as_samples_are_added(baked: Baked) -> None:
-    camera = baked.stage.built.arc.camera(0.5)
+    camera = baked.stage.built.cameras.camera((0.5,))
     window = object_window(baked.stage, camera)
     few = trace_reference(baked.stage, camera, window, 16)
     many = extend_reference(baked.stage, camera, few, 128)
@@ -126,7 +127,7 @@ def test_noise_falls_as_samples_are_added(baked: Baked) -> None:
 
 
 def test_the_ceiling_foretells_how_far_apart_references_of_other_seeds_are(baked: Baked) -> None:
-    camera = baked.stage.built.arc.camera(0.5)
+    camera = baked.stage.built.cameras.camera((0.5,))
     window = object_window(baked.stage, camera)
     traced = [trace_reference(reseeded(baked.stage, 1000 * seed), camera, window, 16) for seed in range(8)]
     mask = np.all([reference.mask for reference in traced], axis=0)
@@ -141,7 +142,7 @@ def test_the_ceiling_foretells_how_far_apart_references_of_other_seeds_are(baked
 
 
 def test_a_reference_is_as_good_as_what_it_measures_asks_for(baked: Baked, tmp_path: Path) -> None:
-    pem, camera = baked.open(), baked.stage.built.arc.camera(0.25)
+    pem, camera = baked.open(), baked.stage.built.cameras.camera((0.25,))
     window = object_window(baked.stage, camera)
     plan, source = pem.store.header.plan, pem.store.header.source
     cache = ReferenceCache(tmp_path, source, plan.depth)
@@ -158,12 +159,12 @@ def test_a_reference_is_as_good_as_what_it_measures_asks_for(baked: Baked, tmp_p
 
 
 def test_references_are_kept_under_all_that_decides_their_light(baked: Baked, tmp_path: Path) -> None:
-    pem, camera = baked.open(), baked.stage.built.arc.camera(0.25)
+    pem, camera = baked.open(), baked.stage.built.cameras.camera((0.25,))
     header, window = pem.store.header, (0, 0, 4, 4)
     cache = ReferenceCache(tmp_path, header.source, header.plan.depth)
     names = {cache.path(camera, window)}
     names.add(cache.path(camera, (0, 0, 4, 5)))
-    names.add(cache.path(baked.stage.built.arc.camera(0.3), window))
+    names.add(cache.path(baked.stage.built.cameras.camera((0.3,)), window))
     names.add(ReferenceCache(tmp_path, header.source, header.plan.depth + 1).path(camera, window))
     config = json.loads(json.dumps(header.source.config))
     config["material"]["r0"] = [0.5, 0.5, 0.5]
@@ -178,7 +179,7 @@ def test_references_are_kept_under_all_that_decides_their_light(baked: Baked, tm
 
 
 def test_a_damaged_reference_is_traced_again(baked: Baked, tmp_path: Path) -> None:
-    header, camera = baked.open().store.header, baked.stage.built.arc.camera(0.25)
+    header, camera = baked.open().store.header, baked.stage.built.cameras.camera((0.25,))
     window = object_window(baked.stage, camera)
     cache = ReferenceCache(tmp_path, header.source, header.plan.depth)
     cache.save(camera, trace_reference(baked.stage, camera, window, 2))
@@ -192,7 +193,12 @@ def test_a_damaged_reference_is_traced_again(baked: Baked, tmp_path: Path) -> No
 
 # Places
 
-ARC = Arc((0.0, 0.1, 0.0), 0.5, 0.2, 20.0, 10.0, 30.0, (64, 48))
+ARC = Cameras("arc", (0.0, 0.1, 0.0), 0.5, 0.2, 20.0, 10.0, 30.0, (64, 48))
+
+
+def arc_space(count: int) -> ParameterSpace:
+    values = tuple(i / (count - 1) for i in range(count)) if count > 1 else (0.0,)
+    return ParameterSpace((Axis("arc", values, 0.0, 1.0),))
 
 
 def places(views: list[View]) -> list[str]:
@@ -200,8 +206,7 @@ def places(views: list[View]) -> list[str]:
 
 
 def test_the_views_are_where_their_places_say() -> None:
-    parameters = [i / 10 for i in range(11)]
-    views = choose_views(ARC, parameters)
+    views = choose_views(ARC, arc_space(11))
     by_place = {view.place: view for view in views}
     assert places(views)[:4] == ["on", "between", "on", "between"]
     assert by_place["on"].degrees == 0.0
@@ -210,10 +215,10 @@ def test_the_views_are_where_their_places_say() -> None:
     assert by_place["between"].degrees == pytest.approx(0.5 * tilt, rel=1e-3)
     for degrees in (1, 2, 5, 10, 15):
         view = by_place[f"off_{degrees}"]
-        assert view.t == 1.0
+        assert view.point == (1.0,)
         chord = 2 * math.degrees(math.asin(tilt * math.sin(math.radians(degrees / 2))))
         assert view.degrees == pytest.approx(chord, rel=1e-6)
-    level = elevation(ARC.camera(0.5))
+    level = elevation(ARC.camera((0.5,)))
     assert elevation(by_place["above_10"].camera) == pytest.approx(level + 10)
     assert elevation(by_place["below_10"].camera) == pytest.approx(level - 10)
     dome = [view for view in views if view.place == "dome"]
@@ -221,30 +226,44 @@ def test_the_views_are_where_their_places_say() -> None:
     assert all(view.degrees > 5 for view in dome)
 
 
+def test_a_dome_is_looked_at_on_its_maps_in_the_middle_of_cells_and_off_both() -> None:
+    azimuth = Axis("azimuth", (0.0, 90.0, 180.0, 270.0), 0.0, 360.0, 360.0)
+    space = ParameterSpace((azimuth, Axis("elevation", (10.0, 50.0), 10.0, 50.0)))
+    cameras = Cameras("dome", (0.0, 0.0, 0.0), 1.0, 0.0, 0.0, 360.0, 30.0, (64, 48))
+    views = choose_views(cameras, space, every=True)
+    on = [view.point for view in views if view.place == "on"]
+    assert on == space.samples()
+    # The last cell closes the circle; the upper ring begins none.
+    between = [view.point for view in views if view.place == "between"]
+    assert between == [(45.0, 30.0), (135.0, 30.0), (225.0, 30.0), (315.0, 30.0)]
+    dome = [view for view in views if view.place == "dome"]
+    assert dome
+    assert all(10 <= elevation(view.camera) <= 50 and view.degrees > 1 for view in dome)
+
+
 def test_a_selection_is_spread_over_the_arc_and_all_is_all() -> None:
-    parameters = [i / 99 for i in range(100)]
-    on = [view.t for view in choose_views(ARC, parameters) if view.place == "on"]
+    on = [view.point[0] for view in choose_views(ARC, arc_space(100)) if view.place == "on"]
     assert len(on) == 5
     assert np.diff(on) == pytest.approx(20 / 99)
-    every = places(choose_views(ARC, parameters, every=True))
+    every = places(choose_views(ARC, arc_space(100), every=True))
     assert (every.count("on"), every.count("between")) == (100, 99)
 
 
 def test_a_full_circle_has_no_place_past_its_end() -> None:
-    circle = Arc((0.0, 0.1, 0.0), 0.5, 0.2, 0.0, 360.0 * 35 / 36, 30.0, (64, 48))
-    names = places(choose_views(circle, [i / 35 for i in range(36)]))
+    circle = Cameras("arc", (0.0, 0.1, 0.0), 0.5, 0.2, 0.0, 360.0 * 35 / 36, 30.0, (64, 48))
+    names = places(choose_views(circle, arc_space(36)))
     assert {"on", "between", "above_10", "off_2", "off_5"} <= set(names)
     assert not {"off_10", "off_15"} & set(names)
 
 
 def test_one_sample_alone_has_places_around_it() -> None:
-    views = choose_views(Arc((0, 0, 0), 0.5, 0.2, 0.0, 0.0, 30.0, (64, 48)), [0.0])
+    views = choose_views(Cameras("arc", (0, 0, 0), 0.5, 0.2, 0.0, 0.0, 30.0, (64, 48)), arc_space(1))
     assert {"on", "off_1", "off_15", "above_10", "below_10"} <= set(places(views))
     assert "between" not in places(views)
 
 
 def test_turning_keeps_the_distance_and_the_target() -> None:
-    camera = ARC.camera(0.3)
+    camera = ARC.camera((0.3,))
     moved = turned(camera, 12.0, -5.0)
     assert moved.target == camera.target
     distances = [np.linalg.norm(np.subtract(c.eye, c.target)) for c in (camera, moved)]
@@ -259,7 +278,7 @@ def test_every_contender_draws_every_view(baked: Baked) -> None:
     pem = baked.open()
     contenders = contenders_of(pem)
     assert tuple(contenders) == CONTENDERS == tuple(TITLES)
-    view = View("off_5", 5.0, 1.0, turned(baked.stage.built.arc.camera(1.0), 5.0, 0.0))
+    view = View("off_5", 5.0, (1.0,), turned(baked.stage.built.cameras.camera((1.0,)), 5.0, 0.0))
     window = object_window(baked.stage, view.camera)
     frame = Frame(pem, view, window)
     pictures = {name: contender.render(frame, "reference") for name, contender in contenders.items()}
@@ -291,11 +310,11 @@ def test_a_single_layer_at_infinity_is_good_on_its_sample_and_slides_off_it(bake
 def test_a_single_layer_is_blended_as_a_pem_is(baked: Baked) -> None:
     pem = baked.open()
     layer = SingleLayer(pem)
-    view = View("between", 0.5, 0.25, baked.stage.built.arc.camera(0.25))
+    view = View("between", 0.5, (0.25,), baked.stage.built.cameras.camera((0.25,)))
     window = object_window(baked.stage, view.camera)
     frame = Frame(pem, view, window)
     blend = layer.render(frame, "reference")
-    ends = [layer.render(Frame(pem, View("", 0, t, view.camera), window), "reference") for t in (0.0, 0.5)]
+    ends = [layer.render(Frame(pem, View("", 0, (t,), view.camera), window), "reference") for t in (0.0, 0.5)]
     # One layer is linear in its map.
     np.testing.assert_allclose(blend, 0.5 * (ends[0] + ends[1]), rtol=1e-4, atol=1e-5)
 
@@ -366,7 +385,7 @@ def test_an_object_that_covers_no_pixel_has_no_figures(tmp_path: Path) -> None:
 def made_up(place: str, pem: float | None, ceiling: float = 40.0) -> ViewFigures:
     metrics: dict[str, Any] = {metric: {} for metric in METRICS}
     metrics["psnr"] = {"pem": {"reference": pem}, "static_infinite": {"reference": 20.0}}
-    return ViewFigures(place, 0.0, 0.0, ceiling, 64, 1.0, metrics)
+    return ViewFigures(place, 0.0, (0.0,), ceiling, 64, 1.0, metrics)
 
 
 def test_the_table_shows_means_by_place_and_leaves_out_what_does_not_exist() -> None:

@@ -200,11 +200,11 @@ def test_the_description_names_every_map_in_order(tmp_path: Path) -> None:
         ShellMap("local", {**INFINITE}, 2, rng.uniform(size=(30, 4)).astype(np.float32)),
         ShellMap("distant", {**INFINITE}, 2, rng.uniform(size=(30, 3)).astype(np.float32)),
     ]
-    sets = [MapSet(f"sample-{i:04d}", i / 2, {"body": shells, "lid": shells[1:]}) for i in range(2)]
+    sets = [MapSet(f"sample-{i:04d}", (i / 2,), {"body": shells, "lid": shells[1:]}) for i in range(2)]
     returned = export_maps(iter(sets), tmp_path, convention="unity")
     read = json.loads((tmp_path / "maps.json").read_text())
     assert read == returned
-    assert [s["parameter"] for s in read["sets"]] == [0.0, 0.5]
+    assert [s["point"] for s in read["sets"]] == [[0.0], [0.5]]
     body, lid = read["sets"][0]["parts"]
     assert [(s["name"], s["channels"], s["levels"]) for s in body["shells"]] == [
         ("local", 4, 2),

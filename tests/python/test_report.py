@@ -122,7 +122,7 @@ def made_up(pem: dict[str, float], static: float) -> Evaluation:
     for place, value in pem.items():
         metrics: dict[str, Any] = {metric: {} for metric in METRICS}
         metrics["psnr"] = {"pem": {"reference": value}, "static_infinite": {"reference": static}}
-        views.append(ViewFigures(place, 0.0, 0.0, 40.0, 16, 1.0, metrics))
+        views.append(ViewFigures(place, 0.0, (0.0,), 40.0, 16, 1.0, metrics))
     return Evaluation(views, {})
 
 

@@ -11,9 +11,9 @@ import pytest
 from mirrorbake import _core
 from mirrorbake.errors import InputError
 from mirrorbake.scene.build import build_scene, rotation_matrix, winding_number
+from mirrorbake.scene.cameras import Cameras
 from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.load import parse_config
-from mirrorbake.scene.parameters import Arc
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -73,11 +73,11 @@ def test_a_closed_mesh_winds_once_about_inner_points_and_not_about_outer_ones() 
 
 
 def test_the_eye_walks_an_arc_about_the_vertical() -> None:
-    arc = Arc(centre=(1, 2, 3), radius=2, height=0.5, start=0, degrees=90, fov=30, size=(8, 4))
-    np.testing.assert_allclose(arc.eye(0), (1, 2.5, 5))
-    np.testing.assert_allclose(arc.eye(1), (3, 2.5, 3))
-    np.testing.assert_allclose(arc.eye(0.5), (1 + math.sqrt(2), 2.5, 3 + math.sqrt(2)))
-    camera = arc.camera(1)
+    arc = Cameras("arc", centre=(1, 2, 3), radius=2, height=0.5, start=0, degrees=90, fov=30, size=(8, 4))
+    np.testing.assert_allclose(arc.eye((0,)), (1, 2.5, 5))
+    np.testing.assert_allclose(arc.eye((1,)), (3, 2.5, 3))
+    np.testing.assert_allclose(arc.eye((0.5,)), (1 + math.sqrt(2), 2.5, 3 + math.sqrt(2)))
+    camera = arc.camera((1,))
     np.testing.assert_allclose(camera.eye, (3, 2.5, 3))
     np.testing.assert_allclose(camera.target, (1, 2, 3))
     assert (camera.width, camera.height, camera.vertical_fov_degrees) == (8, 4, 30)
@@ -88,7 +88,7 @@ def test_by_default_the_object_fills_the_frame_and_stays_inside() -> None:
     edge = math.tan(math.radians(20))
     fills = []
     for t in (0.0, 0.4, 1.0):
-        eye, target = np.array(built.arc.eye(t)), np.array(built.arc.centre)
+        eye, target = np.array(built.cameras.eye((t,))), np.array(built.cameras.centre)
         forward = (target - eye) / np.linalg.norm(target - eye)
         right = np.cross(forward, (0, 1, 0))
         right /= np.linalg.norm(right)

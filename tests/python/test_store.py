@@ -16,6 +16,7 @@ from mirrorbake.pem.header import Header, Source
 from mirrorbake.pem.pyramid import coarser_sizes, decimate, join_pyramid, residual_texels, split_pyramid
 from mirrorbake.pem.store import GROUP_NAME, PemStore, Timings, exclusive
 from mirrorbake.pem.view_images import ViewImages
+from mirrorbake.scene.parameters import Axis, ParameterSpace
 from mirrorbake.scene.plan import Decision, Plan
 
 VIEWS, SIZE, WIDTH, HEIGHT = 3, 8, 6, 4
@@ -38,7 +39,7 @@ def make_header(**changes: Any) -> Header:
     header = Header(
         source=Source("1.2.3", {"maps": {"size": SIZE}, "reflector": {"mesh": "/a/cow.obj"}}, {}),
         plan=make_plan(),
-        parameters=[0.0, 0.5, 1.0],
+        space=ParameterSpace((Axis("arc", (0.0, 0.5, 1.0), 0.0, 1.0),)),
         parts=[
             {"name": "body", "layers": {"local": proxy, "distant": proxy}},
             {"name": "lid", "layers": {"distant": proxy}},
@@ -139,7 +140,7 @@ def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
     fill(make_store(tmp_path))
     group: Any = zarr.open_group(tmp_path / GROUP_NAME, mode="r")
     attributes: Any = group.attrs["mirrorbake"]
-    assert attributes["format_version"] == 2
+    assert attributes["format_version"] == 3
     sizes = attributes["conventions"]["level_sizes"]
     assert sizes == [8, 4, 2, 1]
     finest = np.asarray(group["maps/body/local/finest"][1], np.float32)
@@ -242,7 +243,7 @@ def test_damage_is_reported_with_the_place(tmp_path: Path) -> None:
     newer = json.loads(intact)
     newer["attributes"]["mirrorbake"]["format_version"] = 99
     metadata.write_text(json.dumps(newer))
-    with pytest.raises(StoreError, match="format version 99, this library reads 2"):
+    with pytest.raises(StoreError, match="format version 99, this library reads 3"):
         PemStore.open(tmp_path)
     metadata.write_text(intact)
     store = PemStore.open(tmp_path)

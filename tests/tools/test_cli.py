@@ -386,7 +386,7 @@ def test_options_override_the_scene_file(tmp_path: Path) -> None:
     result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *options)
     assert result.returncode == 0, result.stderr
     header = PemStore.open(tmp_path / "pem").header
-    assert (header.parameters, header.image_size, header.map_size) == ([0.0, 1.0], (24, 16), 8)
+    assert (header.space.samples(), header.image_size, header.map_size) == ([(0.0,), (1.0,)], (24, 16), 8)
     assert header.source.config["trace"]["samples"] == 1
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.probe import LOBE_PROBE_SAMPLES, Probe, probe_points, relative_change, relative_spread
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, hull_triangles, proxy_to_attributes
 from mirrorbake.scene.plan import Decision, Plan
@@ -23,17 +23,9 @@ if TYPE_CHECKING:
 
     DoubleArray = NDArray[np.float64]
 
-PROBE_VIEWS = 5
-PROBE_SIDE = 128
-"""Longer side of the trial images, in pixels."""
-PROBE_SAMPLES = 4
-LOBE_PROBE_SAMPLES = 16
-"""Samples per pixel of the trial images that measure a rough lobe's noise."""
 
 MAX_DEPTH = 16
 """What fewer bounces are compared with."""
-BRIGHTEST_SHARE = 0.01
-"""The brightest pixels are clipped to the next ones, so that one mirrored sun does not decide alone."""
 
 MIRROR_SAMPLES = 16
 MOST_SAMPLES = 256
@@ -65,10 +57,10 @@ def analyze(stage: Stage) -> Plan:
         `maps.distant` names a finite shape, but the object sees no surroundings at a distance.
     """
     trace = stage.config.trace
-    probe = _Probe.of(stage, MAX_DEPTH if trace.depth is None else trace.depth)
+    probe = Probe.of(stage, MAX_DEPTH if trace.depth is None else trace.depth)
     depth = _depth(stage, probe)
     if depth.automatic and depth.value != MAX_DEPTH:
-        probe = _Probe.of(stage, int(depth.value))
+        probe = Probe.of(stage, int(depth.value))
     distant, proxy = _distant(stage, probe)
     on_hull = hull_triangles(stage.built.positions, stage.built.triangles)[probe.triangle]
     local = _local(stage, probe, on_hull)
@@ -84,92 +76,7 @@ def analyze(stage: Stage) -> Plan:
     return Plan(tuple(decisions), proxy_to_attributes(proxy))
 
 
-def _probe_times(stage: Stage) -> list[float]:
-    count = min(PROBE_VIEWS, stage.config.views.count)
-    return [float(t) for t in np.linspace(0.0, 1.0, count)]
-
-
-@dataclass(frozen=True)
-class _Probe:
-    """Samples of small images of a few views, one after the other."""
-
-    view: NDArray[np.int32]
-    pixel: NDArray[np.int64]
-    """Numbered through all views."""
-    part: NDArray[np.int64]
-    triangle: NDArray[np.int64]
-    position: FloatArray
-    reflection: FloatArray
-    beauty: DoubleArray
-    diffuse: DoubleArray
-    fresnel: DoubleArray
-    local: DoubleArray
-    distant: DoubleArray
-
-    @staticmethod
-    def of(stage: Stage, depth: int, samples_per_pixel: int = PROBE_SAMPLES) -> _Probe:
-        width, height = stage.built.arc.size
-        scale = min(1.0, PROBE_SIDE / max(width, height))
-        size = (max(1, round(scale * width)), max(1, round(scale * height)))
-        arc = replace(stage.built.arc, size=size)
-        # The same random numbers at every depth: what differs are the bounces alone.
-        options = _core.TraceOptions(
-            samples_per_pixel=samples_per_pixel, max_specular_depth=depth, seed=stage.config.trace.seed
-        )
-        traces = [
-            stage.tracer.trace_layers(arc.camera(t), stage.built.reflector, options)
-            for t in _probe_times(stage)
-        ]
-
-        def joined(name: str) -> NDArray[np.float32]:
-            return np.concatenate([np.asarray(getattr(trace.samples, name)) for trace in traces])
-
-        def light(shell: int) -> NDArray[np.float32]:
-            return np.concatenate([np.asarray(trace.samples.shells[shell].radiance) for trace in traces])
-
-        counts = [len(trace.samples) for trace in traces]
-        view = np.repeat(np.arange(len(traces), dtype=np.int32), counts)
-        return _Probe(
-            view=view,
-            pixel=joined("pixel").astype(np.int64) + view.astype(np.int64) * (size[0] * size[1]),
-            part=joined("part").astype(np.int64),
-            triangle=joined("triangle").astype(np.int64),
-            position=joined("position"),
-            reflection=joined("reflection"),
-            beauty=np.concatenate([np.asarray(trace.sample_beauty) for trace in traces]).astype(np.float64),
-            diffuse=joined("diffuse").astype(np.float64),
-            fresnel=joined("fresnel").astype(np.float64),
-            local=light(0).astype(np.float64),
-            distant=light(1)[:, :3].astype(np.float64),
-        )
-
-    @property
-    def incident(self) -> DoubleArray:
-        """Radiance that arrives along the reflected rays."""
-        incident: DoubleArray = self.local[:, :3] + (1.0 - self.local[:, 3:]) * self.distant
-        return incident
-
-
-def _pixel_means(values: DoubleArray, pixel: NDArray[np.int64]) -> DoubleArray:
-    _, place, count = np.unique(pixel, return_inverse=True, return_counts=True)
-    sums = [np.bincount(place, weights=values[:, c], minlength=len(count)) for c in range(values.shape[1])]
-    means: DoubleArray = np.stack(sums, axis=-1) / count[:, None]
-    return means
-
-
-def _change(with_it: DoubleArray, without: DoubleArray, pixel: NDArray[np.int64]) -> float:
-    """Relative RMS change of the pixels, the brightest clipped."""
-    if not len(pixel):
-        return 0.0
-    a, b = _pixel_means(with_it, pixel), _pixel_means(without, pixel)
-    # A picture that is black but for a few pixels is judged by those.
-    limit = np.quantile(a, 1.0 - BRIGHTEST_SHARE) or np.inf
-    a, b = np.minimum(a, limit), np.minimum(b, limit)
-    scale = float(np.sqrt(np.mean(a * a)))
-    return float(np.sqrt(np.mean((a - b) ** 2))) / scale if scale > 0.0 else 0.0
-
-
-def _depth(stage: Stage, full: _Probe) -> Decision:
+def _depth(stage: Stage, full: Probe) -> Decision:
     config = stage.config
     if config.trace.depth is not None:
         return Decision("trace.depth", None, config.trace.depth, False, _SET, None)
@@ -178,7 +85,7 @@ def _depth(stage: Stage, full: _Probe) -> Decision:
     too_few, depth = -1, MAX_DEPTH
     while depth - too_few > 1:
         middle = (too_few + depth) // 2
-        changes[middle] = _change(full.beauty, _Probe.of(stage, middle).beauty, full.pixel)
+        changes[middle] = relative_change(full.beauty, Probe.of(stage, middle).beauty, full.pixel)
         if changes[middle] <= config.auto.tolerance:
             depth = middle
         else:
@@ -203,8 +110,8 @@ def _samples(stage: Stage, depth: int) -> Decision:
     if material.lobe == _core.SpecularLobe.mirror:
         reason = "a mirror needs one direction per sample, so that samples only smooth edges"
         return Decision("trace.samples", None, MIRROR_SAMPLES, True, reason, None)
-    probe = _Probe.of(stage, depth, LOBE_PROBE_SAMPLES)
-    spread = _relative_spread(probe.incident, probe.pixel)
+    probe = Probe.of(stage, depth, LOBE_PROBE_SAMPLES)
+    spread = relative_spread(probe.incident, probe.pixel)
     wanted = max((spread / config.auto.noise) ** 2, 1.0)
     samples = min(max(2 ** math.ceil(math.log2(wanted)), MIRROR_SAMPLES), MOST_SAMPLES)
     reason = (
@@ -214,22 +121,7 @@ def _samples(stage: Stage, depth: int) -> Decision:
     return Decision("trace.samples", None, samples, True, reason, spread)
 
 
-def _relative_spread(values: DoubleArray, pixel: NDArray[np.int64]) -> float:
-    """Standard deviation of a pixel's samples over the RMS of the pixels, the brightest clipped."""
-    _, place, count = np.unique(pixel, return_inverse=True, return_counts=True)
-    several = count[place] > 1
-    if not several.any():
-        return 0.0
-    clipped = np.minimum(values[several], np.quantile(values[several], 1.0 - BRIGHTEST_SHARE))
-    means = _pixel_means(clipped, pixel[several])
-    _, place, count = np.unique(pixel[several], return_inverse=True, return_counts=True)
-    squares = np.sum((clipped - means[place]) ** 2, axis=1)
-    variance = np.bincount(place, weights=squares) / (3.0 * (count - 1))
-    scale = float(np.sqrt(np.mean(means * means)))
-    return float(np.sqrt(np.mean(variance))) / scale if scale > 0.0 else 0.0
-
-
-def _diffuse(stage: Stage, probe: _Probe) -> Decision:
+def _diffuse(stage: Stage, probe: Probe) -> Decision:
     config = stage.config
     if config.layers.diffuse is not None:
         return Decision("layers.diffuse", None, config.layers.diffuse, False, _SET, None)
@@ -237,12 +129,12 @@ def _diffuse(stage: Stage, probe: _Probe) -> Decision:
     if not any(material.albedo) and not any(material.emission):
         reason = "the material is black under its mirror"
         return Decision("layers.diffuse", None, False, True, reason, 0.0)
-    change = _change(probe.beauty, probe.beauty - probe.diffuse, probe.pixel)
+    change = relative_change(probe.beauty, probe.beauty - probe.diffuse, probe.pixel)
     reason = f"leaving it out changes the picture by {change:.2%}"
     return Decision("layers.diffuse", None, change > config.auto.tolerance, True, reason, change)
 
 
-def _local(stage: Stage, probe: _Probe, on_hull: NDArray[np.bool_]) -> list[Decision]:
+def _local(stage: Stage, probe: Probe, on_hull: NDArray[np.bool_]) -> list[Decision]:
     config, built = stage.config, stage.built
     if config.layers.local is not None:
         return [Decision("layers.local", None, config.layers.local, False, _SET, None)]
@@ -256,7 +148,7 @@ def _local(stage: Stage, probe: _Probe, on_hull: NDArray[np.bool_]) -> list[Deci
         elif not inside.any():
             value, change, reason = False, 0.0, "all that the views see of it lies on the convex hull"
         else:
-            change = _change(probe.beauty[chosen], without[chosen], probe.pixel[chosen])
+            change = relative_change(probe.beauty[chosen], without[chosen], probe.pixel[chosen])
             value = change > config.auto.tolerance
             share = float(np.mean(probe.local[chosen, 3]))
             reason = (
@@ -278,13 +170,13 @@ def _hull_split(stage: Stage, on_hull: NDArray[np.bool_], *, any_local: bool) ->
     return Decision("layers.hull_split", None, share > 0.0, True, reason, share)
 
 
-def _distant(stage: Stage, probe: _Probe) -> tuple[Decision, _core.Proxy]:
+def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
     maps, built = stage.config.maps, stage.built
     origin = _core.area_weighted_centroid(built.positions, built.triangles)
     wanted = maps.distant
     if wanted == "infinite":
         return Decision("maps.distant", None, wanted, False, _SET, None), _core.Proxy.infinite(origin)
-    distances, _ = stage.tracer.intersect_distance(probe.position, probe.reflection, [built.reflector])
+    distances = _distances(stage, probe)
     usable = distances > 0.0
     near = usable & (distances < LARGEST_BOX)
     if int(near.sum()) < MIN_HITS:
@@ -312,6 +204,20 @@ def _distant(stage: Stage, probe: _Probe) -> tuple[Decision, _core.Proxy]:
         return Decision("maps.distant", None, wanted, False, _SET, None), proxy
     reason = choice.reason.removeprefix(f"{best.name}: ").removesuffix(".")
     return Decision("maps.distant", None, best.name, True, reason, best.off_view_error), proxy
+
+
+def _distances(stage: Stage, probe: Probe) -> FloatArray:
+    """Lengths (n,) of the reflected rays up to the surroundings, metres."""
+    distances = np.empty(len(probe.view), np.float32)
+    for number, point in enumerate(probe_points(stage)):
+        chosen = probe.view == number
+        moved = stage.at(point)
+        distances[chosen], _ = moved.tracer.intersect_distance(
+            np.ascontiguousarray(probe.position[chosen]),
+            np.ascontiguousarray(probe.reflection[chosen]),
+            [moved.built.reflector],
+        )
+    return distances
 
 
 def _fit_box(how: str, hits: FloatArray, origin: Sequence[float], bottom: float) -> _core.Proxy:
@@ -351,8 +257,11 @@ def _lookup_steps(stage: Stage, proxy: _core.Proxy) -> DoubleArray:
     part = 1.0 / 16.0
     options = _core.TraceOptions(samples_per_pixel=1, seed=stage.config.trace.seed)
     steps = []
-    for t in _probe_times(stage):
-        seen = stage.tracer.trace_visibility(stage.built.arc.camera(t), stage.built.reflector, options)
+    for point in probe_points(stage):
+        moved = stage.at(point)
+        seen = moved.tracer.trace_visibility(
+            moved.built.cameras.camera(point), moved.built.reflector, options
+        )
         position, reflection = np.asarray(seen.position, float), np.asarray(seen.reflection, float)
         still = np.zeros_like(position)
         middle, right, below = (

@@ -1,4 +1,4 @@
-"""The bake: for every view of the arc, trace the layers, build rendering matrices, solve, store."""
+"""The bake: for every sample, trace the layers, build rendering matrices, solve, store."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
-from mirrorbake.errors import StoreError
+from mirrorbake.errors import OptionError, StoreError
 from mirrorbake.pem.header import Header, Source
 from mirrorbake.pem.store import GROUP_NAME, PemStore, Timings, exclusive
 from mirrorbake.pem.view_images import images_of_trace
 from mirrorbake.proxy import hull_triangles, proxy_from_attributes, proxy_to_attributes
 from mirrorbake.scene.inputs import hash_inputs
+from mirrorbake.scene.parameters import space_of
 from mirrorbake.scene.stage import prepare_stage
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from mirrorbake.arrays import FloatArray
@@ -56,6 +58,7 @@ def bake(
     progress: ProgressReport | None = None,
     stage: Stage | None = None,
     on_plan: PlanReport | None = None,
+    samples: Sequence[int] | None = None,
 ) -> BakeSummary:
     """Bake a scene's PEM into a folder, or finish one that was interrupted.
 
@@ -72,18 +75,24 @@ def bake(
     on_plan
         Told what is "auto" in the scene and was decided, before the first view; when resuming, what was
         decided then.
+    samples
+        Numbers of those to bake; None: all. Each comes out the same, bit for bit, whichever others are
+        baked, and when.
 
     Raises
     ------
     StoreError
         The folder cannot be written to, holds something else, or a PEM of another scene.
     InputError
-        The scene is not usable. Nothing has been written then.
+        The scene is not usable, or has no such sample. Nothing has been written then.
     """
     report = progress or (lambda done, total, text: None)
     source = Source(_core.version(), json.loads(config.model_dump_json()), hash_inputs(config))
     _check_output(directory, source)
-    total = config.views.count
+    total = len(space_of(config))
+    for index in samples or ():
+        if not 0 <= index < total:
+            raise OptionError(f"sample {index}: expected 0 to {total - 1}")
     report(0, total, "preparing the scene")
     stage = replace(stage or prepare_stage(config), config=config)
     try:
@@ -106,11 +115,12 @@ def bake(
         capture = _core.build_cube_pyramid(store.read_capture())
         baker = _ViewBaker(stage, store, capture)
         clamped = 0
-        for index in range(total):
+        wanted = range(total) if samples is None else samples
+        for step, index in enumerate(wanted):
             if not done[index]:
-                report(index, total, f"view {index + 1} of {total}")
+                report(step, len(wanted), f"sample {index + 1} of {total}")
                 clamped += baker.bake_view(index)
-        report(total, total, f"{total} views")
+        report(len(wanted), len(wanted), f"{len(wanted)} samples")
     return BakeSummary(
         views=total, resumed=resumed, plan=store.header.plan, clamped=clamped, notes=stage.built.notes
     )
@@ -149,7 +159,7 @@ def _create_store(stage: Stage, plan: Plan, source: Source, directory: Path) -> 
     header = Header(
         source=source,
         plan=plan,
-        parameters=config.views.parameters(),
+        space=built.space,
         parts=parts,
         static={
             "infinite": proxy_to_attributes(_core.Proxy.infinite(origin)),
@@ -196,7 +206,7 @@ class _ViewBaker:
     def bake_view(self, index: int) -> int:
         """Bake one view; returns how many values had to be clamped."""
         start = time.perf_counter()
-        trace = self._stage.trace(self._store.header.parameters[index])
+        trace = self._stage.trace(self._store.header.space.sample(index))
         trace_s = time.perf_counter() - start
         build_s = solve_s = 0.0
         maps = {}
@@ -215,8 +225,7 @@ class _ViewBaker:
                 values = self._values(trace.samples, layer, "local" in part["layers"])
                 target = matrix.average(trace.samples, number, values, triangles)
                 middle = time.perf_counter()
-                initial = self._initial(part["name"], layer, index)
-                maps[part["name"], layer] = self._infer(matrix, target, layer, initial)
+                maps[part["name"], layer] = self._infer(matrix, target, layer)
                 build_s += middle - start
                 solve_s += time.perf_counter() - middle
         return self._store.write_view(index, maps, images_of_trace(trace), Timings(trace_s, build_s, solve_s))
@@ -228,15 +237,9 @@ class _ViewBaker:
         distant = np.asarray(samples.shells[1].radiance)[:, :3]
         return distant if has_local else local[:, :3] + (1.0 - local[:, 3:]) * distant
 
-    def _initial(self, part: str, layer: str, index: int) -> FloatArray | None:
-        # The neighbour as it was stored, so that a resumed bake starts from the same values.
-        if index > 0:
-            return self._store.read_map(part, layer, index - 1)
-        return self._capture if layer == "distant" else None
-
-    def _infer(
-        self, matrix: _core.RenderingMatrix, target: FloatArray, layer: str, initial: FloatArray | None
-    ) -> FloatArray:
+    def _infer(self, matrix: _core.RenderingMatrix, target: FloatArray, layer: str) -> FloatArray:
+        # Never a neighbour's maps as they were baked: a sample is a function of the scene and its number.
+        initial = self._capture if layer == "distant" else None
         if matrix.rows == 0:
             channels = target.shape[1]
             return np.zeros((self._layout.texels, channels), np.float32) if initial is None else initial

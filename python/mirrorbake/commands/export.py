@@ -82,7 +82,7 @@ def _export_maps(
             return
         yield static_set(store)
         if all_samples:
-            yield from (sample_set(store, i) for i in range(len(store.header.parameters)))
+            yield from (sample_set(store, i) for i in range(len(store.header.space)))
 
     export_maps(sets(), out, format=format, convention=convention, precision=precision, report=_print_message)
     _print_message(f"wrote {out / DESCRIPTION_NAME} and the maps that it names")

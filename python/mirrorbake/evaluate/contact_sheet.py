@@ -18,6 +18,7 @@ from mirrorbake.evaluate.metrics import display_referred
 from mirrorbake.evaluate.places import choose_views
 from mirrorbake.files import atomic_output
 from mirrorbake.pem.view_images import ViewImages
+from mirrorbake.scene.parameters import format_point
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -71,10 +72,10 @@ def contact_sheet(pem: OpenedPem, path: Path) -> None:
     InputError
         The object covers no pixel of those views, or the file cannot be written.
     """
-    arc, middle = pem.stage.built.arc, (len(pem.parameters) - 1) // 2
-    views = choose_views(arc, pem.parameters, every=True)
-    # On a sample and between two take turns.
-    near = [view for view in views[2 * middle : 2 * middle + 2] if view.place in ("on", "between")]
+    middle = pem.space.sample((len(pem.space) - 1) // 2)
+    views = choose_views(pem.stage.built.cameras, pem.space, every=True)
+    first = next(i for i, view in enumerate(views) if view.place == "on" and view.point == middle)
+    near = [views[first], *(view for view in views[first + 1 : first + 2] if view.place == "between")]
     onlooker = Onlooker(pem)
     seen = [onlooker.look(view) for view in near]
     there = [one for one in seen if one is not None]
@@ -92,11 +93,12 @@ def _view(seen: SeenView, window: Window) -> _View:
     view, reference = seen.view, seen.reference
     part = _inside(window, reference.window)
     images = reference.images
+    where = ("t = " if len(view.point) == 1 else "") + format_point(view.point)
     if view.place == "on":
-        title, note = "On a sampled view", f"t = {view.t:.3f}: the maps were inferred from this view"
+        title, note = "On a sampled view", f"{where}: the maps were inferred from this view"
     else:
         title = "Half-way between two samples"
-        note = f"t = {view.t:.3f}: {view.degrees:.3g}° from both, their maps blended"
+        note = f"{where}: {view.degrees:.3g}° from the nearest, their maps blended"
     run_time = RUN_TIMES[0]
     chosen = [name for name in SHEET_CONTENDERS if name in seen.pictures]
     return _View(

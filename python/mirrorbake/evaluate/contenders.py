@@ -9,6 +9,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.evaluate.references import options_of
+from mirrorbake.pem.run_time import blended
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from mirrorbake.evaluate.places import View
     from mirrorbake.evaluate.references import Window
     from mirrorbake.pem.opened import OpenedPem
+    from mirrorbake.scene.parameters import Point
 
 RUN_TIMES = ("reference",)
 """How contenders are drawn, in the order of the tables.
@@ -39,7 +41,7 @@ class Frame:
     def samples(self, run_time: str) -> _core.SurfaceSamples:
         """Where a run time's lookups see the reflector, by one of `RUN_TIMES`."""
         if run_time not in self._samples:
-            stage = self.pem.stage
+            stage = self.pem.stage.at(self.view.point)
             options = options_of(stage, stage.options.samples_per_pixel, stage.config.trace.seed, self.window)
             self._samples[run_time] = stage.tracer.trace_visibility(
                 self.view.camera, stage.built.reflector, options
@@ -77,12 +79,12 @@ def contenders_of(pem: OpenedPem) -> dict[str, Contender]:
     """
 
     def stored(name: str) -> Callable[[Frame, str], FloatArray]:
-        return lambda frame, run_time: pem.run_time.render(name, frame.view.t, frame.samples(run_time))
+        return lambda frame, run_time: pem.run_time.render(name, frame.view.point, frame.samples(run_time))
 
     found = {"pem": stored("pem")}
-    if len(pem.parameters) > 1:
+    if len(pem.space) > 1:
         found["pem_nearest"] = lambda frame, run_time: pem.run_time.render(
-            "pem", nearest_parameter(pem, frame.view.t), frame.samples(run_time)
+            "pem", nearest_sample(pem, frame.view.point), frame.samples(run_time)
         )
     found["pem_single_infinite"] = SingleLayer(pem).render
     found["static_infinite"] = stored("static_infinite")
@@ -91,9 +93,10 @@ def contenders_of(pem: OpenedPem) -> dict[str, Contender]:
     return {name: Contender(TITLES[name], render) for name, render in found.items()}
 
 
-def nearest_parameter(pem: OpenedPem, t: float) -> float:
-    """Parameter of the sampled view nearest to t; of two, the first."""
-    return min(pem.parameters, key=lambda parameter: abs(parameter - t))
+def nearest_sample(pem: OpenedPem, point: Point) -> Point:
+    """Point of the sample of largest weight; of several, the first."""
+    index, _ = max(pem.space.neighbours(point), key=lambda share: share[1])
+    return pem.space.sample(index)
 
 
 class SingleLayer:
@@ -122,18 +125,18 @@ class SingleLayer:
 
     def render(self, frame: Frame, run_time: str) -> FloatArray:
         """Draw the reflector: radiance (H, W, 3). Between two samples their maps are blended, as a PEM's."""
-        first, second, weight = self._pem.run_time.neighbours(frame.view.t)
-        self._maps = {i: self._maps.get(i) or self._infer(i) for i in {first, second}}
+        shares = self._pem.space.neighbours(frame.view.point)
+        self._maps = {i: self._maps.get(i) or self._infer(i) for i, _ in shares}
         maps = [
-            a if weight == 0.0 else np.float32(1.0 - weight) * a + np.float32(weight) * b
-            for a, b in zip(self._maps[first], self._maps[second], strict=True)
+            blended([(self._maps[i][part], weight) for i, weight in shares])
+            for part in range(len(self._pem.store.header.parts))
         ]
         parts = [_core.PartMaps(self._proxy, texels) for texels in maps]
         return self._pem.run_time.render_parts(parts, frame.samples(run_time))
 
     def _infer(self, index: int) -> list[FloatArray]:
         stage, header = self._pem.stage, self._pem.store.header
-        samples = stage.trace(header.parameters[index]).samples
+        samples = stage.trace(header.space.sample(index)).samples
         incident = np.zeros((len(samples), 3), np.float32)
         through = np.ones((len(samples), 1), np.float32)
         for shell in samples.shells:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
     from mirrorbake.bake.bake import ProgressReport
     from mirrorbake.evaluate.contenders import Contender
+    from mirrorbake.scene.parameters import Point
     from mirrorbake.scene.stage import Stage
 
 METRICS_NAME = "metrics.json"
@@ -53,8 +54,8 @@ class ViewFigures:
     place: str
     degrees: float
     """From the nearest sampled view, as seen from the object."""
-    t: float
-    """Parameter of the PEM that was drawn."""
+    point: Point
+    """Of the parameter space, at which the PEM was drawn."""
     ceiling: float
     """PSNR in dB that the true image would have against this view's reference: its noise."""
     samples: int
@@ -114,7 +115,7 @@ class Evaluation:
             {
                 "place": view.place,
                 "degrees": view.degrees,
-                "t": view.t,
+                "point": list(view.point),
                 "ceiling": finite(view.ceiling),
                 "reference_samples": view.samples,
                 "reference_s": view.seconds,
@@ -159,7 +160,8 @@ class Onlooker:
 
     def look(self, view: View) -> SeenView | None:
         """Return a view with a reference that is good enough for it; None if the object is not in it."""
-        window = object_window(self.pem.stage, view.camera)
+        stage = self.pem.stage.at(view.point)
+        window = object_window(stage, view.camera)
         if window[2] == 0:
             return None
         frame = Frame(self.pem, view, window)
@@ -173,7 +175,7 @@ class Onlooker:
             errors = [reference.error(image) for image in images]
             return None if None in errors else min(error for error in errors if error is not None)
 
-        reference = refined_reference(self.pem.stage, view.camera, window, self.cache, best_error)
+        reference = refined_reference(stage, view.camera, window, self.cache, best_error)
         return SeenView(view, reference, pictures) if reference.mask.any() else None
 
 
@@ -209,11 +211,11 @@ def evaluate(
         As `open_pem` raises it.
     """
     report = progress or (lambda done, total, text: None)
-    count = len(PemStore.open(directory).header.parameters)
+    count = len(PemStore.open(directory).header.space)
     report(0, count, "preparing the scene")
     pem = open_pem(directory, stage)
     onlooker = Onlooker(pem)
-    views = choose_views(pem.stage.built.arc, pem.parameters, every=every_view)
+    views = choose_views(pem.stage.built.cameras, pem.space, every=every_view)
     figures: list[ViewFigures] = []
     unseen = []
     before: SeenView | None = None
@@ -285,7 +287,7 @@ def _figures(seen: SeenView, before: SeenView | None) -> ViewFigures:
                 metrics[metric][contender][run_time] = value
     view = seen.view
     return ViewFigures(
-        view.place, view.degrees, view.t, reference.ceiling, reference.samples, reference.seconds, metrics
+        view.place, view.degrees, view.point, reference.ceiling, reference.samples, reference.seconds, metrics
     )
 
 

@@ -13,7 +13,8 @@ from mirrorbake import _core
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mirrorbake.scene.parameters import Arc
+    from mirrorbake.scene.cameras import Cameras
+    from mirrorbake.scene.parameters import ParameterSpace, Point
 
     Vector = NDArray[np.float64]
 
@@ -53,53 +54,59 @@ class View:
     """One of `PLACES`."""
     degrees: float
     """Between the directions towards this eye and towards the nearest sampled one, seen from the target."""
-    t: float
-    """Parameter of the PEM that is drawn: of views off the arc, the nearest on it."""
+    point: Point
+    """Of the parameter space, at which the PEM is drawn: of views outside of it, the nearest in it."""
     camera: _core.Camera
 
 
-def choose_views(arc: Arc, parameters: list[float], *, every: bool = False) -> list[View]:
+def choose_views(cameras: Cameras, space: ParameterSpace, *, every: bool = False) -> list[View]:
     """Choose the views of an evaluation.
 
     Parameters
     ----------
-    arc
-        The path of the eye.
-    parameters
-        t of the sampled views, ascending.
+    cameras
+        Where the eye is at the points of the space.
+    space
+        With maps at its nodes.
     every
-        Look at every sample and between every two. Otherwise the arc is cut into √n/2 equal stretches, at
-        most 5, for n samples, and the sample in the middle of each is looked at, with the place half-way to
+        Look at every sample and between every two. Otherwise the samples are cut into √n/2 equal stretches,
+        at most 5, for n samples, and the one in the middle of each is looked at, with the place half-way to
         the next.
 
     Returns
     -------
     list
-        A view between two samples follows the first of them. Then come views along the arc's circle past
-        its end, above and below its middle sample, and on a dome. Where the arc goes full circle there is
-        no place past its end.
+        A view between samples, in the middle of a cell of the grid, follows the first of them. Then come
+        views further around past the last sample, above and below the middle one, and on a dome (of a PEM
+        over a dome: within it, off its samples). Where the arc goes full circle there is no place past its
+        end.
     """
-    cameras = [arc.camera(t) for t in parameters]
+    samples = space.samples()
+    sampled = [cameras.camera(point) for point in samples]
     views = []
-    for index in _chosen(len(parameters), every=every):
-        views.append(View("on", 0.0, parameters[index], cameras[index]))
-        if index + 1 < len(parameters):
-            t = 0.5 * (parameters[index] + parameters[index + 1])
-            views.append(_view("between", t, arc.camera(t), cameras))
-    turn = math.copysign(1.0, arc.degrees)
+    for index in _chosen(len(samples), every=every):
+        views.append(View("on", 0.0, samples[index], sampled[index]))
+        middle = space.middle_after(index)
+        if middle is not None:
+            views.append(_view("between", middle, cameras.camera(middle), sampled))
+    turn = math.copysign(1.0, cameras.degrees)
     for degrees in OFF_DEGREES:
-        view = _view(f"off_{degrees}", parameters[-1], turned(cameras[-1], turn * degrees, 0.0), cameras)
+        view = _view(f"off_{degrees}", samples[-1], turned(sampled[-1], turn * degrees, 0.0), sampled)
         # On a full circle the first sample is nearer than the last.
-        if view.degrees > 0.5 * angle_between(view.camera, cameras[-1]):
+        if view.degrees > 0.5 * angle_between(view.camera, sampled[-1]):
             views.append(view)
-    middle = (len(parameters) - 1) // 2
+    middle_sample = (len(samples) - 1) // 2
     for name, degrees in (("above", RAISED_DEGREES), ("below", -RAISED_DEGREES)):
-        if abs(elevation(cameras[middle]) + degrees) < 89.0:
-            camera = turned(cameras[middle], 0.0, degrees)
-            views.append(_view(f"{name}_{RAISED_DEGREES}", parameters[middle], camera, cameras))
-    for share, height in DOME:
-        camera = arc.camera(share)
-        views.append(_view("dome", share, turned(camera, 0.0, height - elevation(camera)), cameras))
+        if abs(elevation(sampled[middle_sample]) + degrees) < 89.0:
+            camera = turned(sampled[middle_sample], 0.0, degrees)
+            views.append(_view(f"{name}_{RAISED_DEGREES}", samples[middle_sample], camera, sampled))
+    if cameras.kind == "arc":
+        for share, height in DOME:
+            point = (share, *samples[middle_sample][1:])
+            camera = cameras.camera(point)
+            views.append(_view("dome", point, turned(camera, 0.0, height - elevation(camera)), sampled))
+    elif cameras.kind == "dome":
+        views += [_view("dome", point, cameras.camera(point), sampled) for point in space.spread(len(DOME))]
     return views
 
 
@@ -110,8 +117,8 @@ def _chosen(count: int, *, every: bool) -> list[int]:
     return [int((stretch + 0.5) * (count - 1) / pairs) for stretch in range(pairs)]
 
 
-def _view(place: str, t: float, camera: _core.Camera, sampled: list[_core.Camera]) -> View:
-    return View(place, min(angle_between(camera, other) for other in sampled), t, camera)
+def _view(place: str, point: Point, camera: _core.Camera, sampled: list[_core.Camera]) -> View:
+    return View(place, min(angle_between(camera, other) for other in sampled), point, camera)
 
 
 def _offset(camera: _core.Camera) -> Vector:

@@ -41,7 +41,7 @@ SEED_OFFSET = 0x5EED_0000
 """Keeps seeds of references apart from those of targets: samples lie elsewhere in the pixels."""
 WINDOW_MARGIN = 6
 """Pixels around the object that are traced, too: metrics of structure look around a pixel."""
-_LIGHT_SECTIONS = ("reflector", "material", "surroundings")
+_LIGHT_SECTIONS = ("reflector", "material", "surroundings", "motion", "light")
 _LIGHT_KEYS = ("seed", "indirect", "cache_rays")
 
 
@@ -218,16 +218,18 @@ class ReferenceCache:
         self._light = [source.library, content, files, trace, depth]
         self.problem: str | None = None
 
-    def path(self, camera: _core.Camera, window: Window) -> Path:
-        """Where the reference of a view is, or would be."""
+    def path(self, camera: _core.Camera, window: Window, scene: Mapping[str, float] | None = None) -> Path:
+        """Where the reference of a view is, or would be; `scene`: its coordinates that change the scene."""
         place = [list(camera.eye), list(camera.target), list(camera.up)]
         frame = [camera.vertical_fov_degrees, camera.width, camera.height, *window]
-        text = json.dumps([self._light, place, frame])
+        text = json.dumps([self._light, place, frame, dict(scene or {})])
         return self._folder / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.npz"
 
-    def load(self, camera: _core.Camera, window: Window) -> Reference | None:
+    def load(
+        self, camera: _core.Camera, window: Window, scene: Mapping[str, float] | None = None
+    ) -> Reference | None:
         """The reference of a view; None if there is none, or it cannot be read."""
-        path = self.path(camera, window)
+        path = self.path(camera, window, scene)
         try:
             with np.load(path) as file:
                 first, second = (
@@ -240,7 +242,9 @@ class ReferenceCache:
             return None
         return Reference(window, (first, second), int(samples), int(batches), float(seconds))
 
-    def save(self, camera: _core.Camera, reference: Reference) -> None:
+    def save(
+        self, camera: _core.Camera, reference: Reference, scene: Mapping[str, float] | None = None
+    ) -> None:
         """Keep a reference."""
         arrays = {
             f"{name}_{number}": getattr(half, name).astype(np.float32)
@@ -250,7 +254,7 @@ class ReferenceCache:
         about = np.array([reference.samples, reference.batches, reference.seconds])
         try:
             self._folder.mkdir(exist_ok=True)
-            with atomic_output(self.path(camera, reference.window)) as temporary:
+            with atomic_output(self.path(camera, reference.window, scene)) as temporary:
                 np.savez(temporary, allow_pickle=False, about=about, **arrays)
         except OSError as failure:
             self.problem = str(failure)
@@ -284,7 +288,7 @@ def refined_reference(
     Reference
         With at most 1024 samples per pixel, even if those are not enough.
     """
-    reference = cache.load(camera, window)
+    reference = cache.load(camera, window, stage.place)
     traced = reference is None
     if reference is None:
         reference = trace_reference(stage, camera, window, FIRST_SAMPLES)
@@ -298,5 +302,5 @@ def refined_reference(
         reference = extend_reference(stage, camera, reference, min(math.ceil(wanted), MOST_SAMPLES))
         traced = True
     if traced:
-        cache.save(camera, reference)
+        cache.save(camera, reference, stage.place)
     return reference

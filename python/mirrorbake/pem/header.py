@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from mirrorbake.pem.pyramid import coarser_sizes
+from mirrorbake.scene.parameters import ParameterSpace
 from mirrorbake.scene.plan import Plan
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     from mirrorbake.scene.inputs import Inputs
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,8 @@ class Header:
     source: Source
     plan: Plan
     """What was decided before the bake; a resumed one keeps to it."""
-    parameters: list[float]
-    """t of every view, in [0,1]."""
+    space: ParameterSpace
+    """At whose nodes the maps are."""
     parts: list[dict[str, Any]]
     """Per part of the reflector, in order: name, and layers as {layer name: proxy}."""
     static: dict[str, Any]
@@ -113,7 +114,7 @@ class Header:
             "map_size": self.map_size,
             "precision": self.precision,
             "image_size": list(self.image_size),
-            "parameters": self.parameters,
+            "space": self.space.to_attributes(),
             "parts": self.parts,
             "static": self.static,
             "config": self.source.config,
@@ -128,7 +129,7 @@ class Header:
         return Header(
             source=Source(attributes["library"], attributes["config"], attributes["inputs"]),
             plan=Plan.from_json(attributes["plan"]),
-            parameters=list(attributes["parameters"]),
+            space=ParameterSpace.from_attributes(attributes["space"]),
             parts=attributes["parts"],
             static=attributes["static"],
             map_size=attributes["map_size"],

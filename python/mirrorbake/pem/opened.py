@@ -16,6 +16,8 @@ from mirrorbake.scene.stage import Stage, prepare_stage
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from mirrorbake.scene.parameters import ParameterSpace
+
 
 @dataclass(frozen=True)
 class OpenedPem:
@@ -26,9 +28,9 @@ class OpenedPem:
     run_time: RunTime
 
     @property
-    def parameters(self) -> list[float]:
-        """Parameter t of every sampled view."""
-        return self.store.header.parameters
+    def space(self) -> ParameterSpace:
+        """The parameter space, at whose nodes the maps are."""
+        return self.store.header.space
 
 
 def open_pem(directory: Path, stage: Stage | None = None) -> OpenedPem:

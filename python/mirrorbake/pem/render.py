@@ -1,11 +1,11 @@
-"""One picture of a PEM at any parameter of its arc."""
+"""One picture of a PEM at any point of its parameter space."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from mirrorbake import _core
-from mirrorbake.errors import InputError, OptionError
+from mirrorbake.errors import InputError
 from mirrorbake.files import check_writable
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.pem.view_images import images_of_trace
@@ -14,19 +14,21 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.scene.parameters import PointLike
 
 PICTURE_SUFFIXES = (".exr", ".png")
 
 
-def render(directory: Path, t: float, out: Path) -> FloatArray:
+def render(directory: Path, point: PointLike, out: Path) -> FloatArray:
     """Draw a PEM over its ray-traced background and write the picture.
 
     Parameters
     ----------
     directory
         Holds a complete PEM.
-    t
-        Parameter of the arc in [0,1]. Between two sampled views their maps are blended linearly.
+    point
+        Of the parameter space, such as t in [0,1] of an arc. Between nodes their maps are blended by
+        multilinear weights.
     out
         An .exr (scene-linear, float16) or a .png (clipped to [0,1] and sRGB-encoded, 8 bit).
 
@@ -38,20 +40,18 @@ def render(directory: Path, t: float, out: Path) -> FloatArray:
     Raises
     ------
     InputError
-        t is outside [0,1], or `out` has another suffix or cannot be written.
+        The point is not of the space, or `out` has another suffix or cannot be written.
     """
     if out.suffix.lower() not in PICTURE_SUFFIXES:
         raise InputError(f"{out}: expected a name that ends in {' or '.join(PICTURE_SUFFIXES)}")
-    if not 0.0 <= t <= 1.0:
-        raise OptionError(f"view = {t:g}: expected a parameter of the arc, from 0 to 1")
     check_writable(out)
     pem = open_pem(directory)
-    first, _, weight = pem.run_time.neighbours(t)
-    if weight == 0.0:
-        samples, images = pem.stage.visibility(t), pem.store.read_images(first)
+    blend = pem.space.neighbours(point)
+    if len(blend) == 1 and pem.space.sample(blend[0][0]) == pem.space.point(point):
+        samples, images = pem.stage.visibility(point), pem.store.read_images(blend[0][0])
     else:
-        trace = pem.stage.trace(t)
+        trace = pem.stage.trace(point)
         samples, images = trace.samples, images_of_trace(trace)
-    picture = images.composite(pem.run_time.render("pem", t, samples))
+    picture = images.composite(pem.run_time.render("pem", point, samples))
     _core.save_image(str(out), picture, ["R", "G", "B"])
     return picture

@@ -8,22 +8,35 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.errors import OptionError
 from mirrorbake.proxy import proxy_from_attributes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
     from mirrorbake.pem.store import PemStore
+    from mirrorbake.scene.parameters import PointLike
+
+
+def blended(shares: Sequence[tuple[FloatArray, float]]) -> FloatArray:
+    """Return the weighted sum of arrays of one shape; an array of weight 1 alone comes out as it is."""
+    first, weight = shares[0]
+    if len(shares) == 1 and weight == 1.0:
+        return first
+    total = np.float32(weight) * first
+    for values, weight in shares[1:]:
+        total += np.float32(weight) * values
+    return total
 
 
 @dataclass
 class RunTime:
     """A PEM opened for drawing.
 
-    Maps of two neighbouring views are kept in memory, so that walking along the arc reads each view once.
+    The maps of the last blend are kept in memory, so that walking along an axis reads each sample once.
     """
 
     store: PemStore
@@ -46,36 +59,17 @@ class RunTime:
         """Whether the static map on the distant layer's geometry is a contender: it is not at infinity."""
         return self._header.static["proxy"] is not None
 
-    def neighbours(self, t: float) -> tuple[int, int, float]:
-        """Views on both sides of a parameter and the weight of the second.
-
-        Raises
-        ------
-        OptionError
-            t is outside [0,1].
-        """
-        if not 0.0 <= t <= 1.0:
-            raise OptionError(f"view = {t:g}: expected a parameter of the arc, from 0 to 1")
-        parameters = self._header.parameters
-        place = t * (len(parameters) - 1)
-        nearest = round(place)
-        # A parameter that was printed with a few digits still means the sampled view.
-        if abs(place - nearest) < 1e-6:
-            return nearest, nearest, 0.0
-        first = int(place)
-        return first, first + 1, place - first
-
-    def render(self, contender: str, t: float, samples: _core.SurfaceSamples) -> FloatArray:
+    def render(self, contender: str, point: PointLike, samples: _core.SurfaceSamples) -> FloatArray:
         """Draw the reflector.
 
         Parameters
         ----------
         contender
             `pem`, `static_infinite` or `static_proxy`.
-        t
-            Parameter in [0,1]; between two views the PEM blends their maps linearly.
+        point
+            Of the parameter space; between nodes the PEM blends their maps by multilinear weights.
         samples
-            Where the camera of t sees the reflector.
+            Where the camera of the point sees the reflector.
 
         Returns
         -------
@@ -83,7 +77,7 @@ class RunTime:
             Radiance (H, W, 3), the mean over the samples that see the reflector; 0 where there are none.
         """
         if contender == "pem":
-            parts = self._pem_parts(*self.neighbours(t))
+            parts = self._pem_parts(self._header.space.neighbours(point))
         else:
             parts = self._static_parts("infinite" if contender == "static_infinite" else "proxy")
         return self.render_parts(parts, samples)
@@ -97,15 +91,13 @@ class RunTime:
         coverage = image[..., 3:]
         return np.divide(image[..., :3], coverage, out=np.zeros_like(image[..., :3]), where=coverage > 0.0)
 
-    def _pem_parts(self, first: int, second: int, weight: float) -> list[_core.PartMaps]:
-        self._views = {i: self._views.get(i) or self._read_view(i) for i in {first, second}}
+    def _pem_parts(self, blend: list[tuple[int, float]]) -> list[_core.PartMaps]:
+        self._views = {i: self._views.get(i) or self._read_view(i) for i, _ in blend}
         parts = []
         for part in self._header.parts:
             maps = {}
             for layer in part["layers"]:
-                a = self._views[first][part["name"], layer]
-                b = self._views[second][part["name"], layer]
-                maps[layer] = a if weight == 0.0 else np.float32(1.0 - weight) * a + np.float32(weight) * b
+                maps[layer] = blended([(self._views[i][part["name"], layer], share) for i, share in blend])
             distant = proxy_from_attributes(part["layers"]["distant"])
             if "local" in maps:
                 local = proxy_from_attributes(part["layers"]["local"])

@@ -308,7 +308,7 @@ def _compressor(dtype: str) -> BloscCodec:
 
 
 def _create_arrays(group: zarr.Group, header: Header) -> None:
-    views, size = len(header.parameters), header.map_size
+    views, size = len(header.space), header.map_size
     width, height = header.image_size
 
     def create(name: str, shape: tuple[int, ...], dtype: str, dimensions: tuple[str, ...]) -> None:

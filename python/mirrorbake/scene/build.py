@@ -10,6 +10,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.errors import InputError
+from mirrorbake.scene.cameras import Cameras, resolve_cameras
 from mirrorbake.scene.config import (
     ILLUMINANT,
     MaterialConfig,
@@ -17,7 +18,7 @@ from mirrorbake.scene.config import (
     SceneConfig,
     Surroundings,
 )
-from mirrorbake.scene.parameters import Arc, resolve_arc
+from mirrorbake.scene.parameters import ParameterSpace, Point, format_point, space_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,13 +43,60 @@ class BuiltScene:
     parts: NDArray[np.uint16]
     """(T,) part of every triangle."""
     part_names: list[str]
-    arc: Arc
+    cameras: Cameras
+    space: ParameterSpace
     notes: list[str]
     """What the user should know about the inputs, such as values that had to be changed."""
 
 
-def build_scene(config: SceneConfig) -> BuiltScene:
+@dataclass(frozen=True)
+class Pose:
+    """Where the object has moved to, as a function of its coordinate; lengths in metres."""
+
+    offset: NDArray[np.float64]
+    """(3,) that it has moved."""
+    turned: float
+    """Degrees about the vertical through `pivot`."""
+    pivot: NDArray[np.float64]
+    """(3,) the centre of the object's base at rest."""
+
+    @staticmethod
+    def of(config: SceneConfig, coordinate: float) -> Pose:
+        """Return the pose at a coordinate of [motion]; at rest without that section."""
+        pivot = np.array(config.reflector.position)
+        if config.motion is None:
+            return Pose(np.zeros(3), 0.0, pivot)
+        return Pose(coordinate * np.array(config.motion.to), coordinate * config.motion.turn, pivot)
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """The matrix (3, 3) of the turn."""
+        return rotation_matrix((0.0, self.turned, 0.0))
+
+    def moved(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return points (..., 3) that move with the object."""
+        if not self.turned and not self.offset.any():
+            return points
+        moved: NDArray[np.float64] = (points - self.pivot) @ self.rotation.T + self.pivot + self.offset
+        return moved
+
+    def at_rest(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Inverse of `moved`."""
+        if not self.turned and not self.offset.any():
+            return points
+        rest: NDArray[np.float64] = (points - self.offset - self.pivot) @ self.rotation + self.pivot
+        return rest
+
+
+def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     """Build everything that a scene file describes.
+
+    Parameters
+    ----------
+    config
+        The scene file.
+    point
+        Of the parameter space: where the object has moved to and the light has turned. None: at rest.
 
     Raises
     ------
@@ -59,9 +107,16 @@ def build_scene(config: SceneConfig) -> BuiltScene:
     mirrorbake.InvalidArgument
         The scene is not usable: vertices that are not finite, no area.
     """
-    scene, notes = _surroundings(config.surroundings)
+    space = space_of(config)
+    place = {} if point is None else space.scene_coordinates(point)
+    surroundings = config.surroundings
+    if config.light is not None:
+        turned = surroundings.rotation + place.get("light", 0.0) * config.light.turn
+        surroundings = surroundings.model_copy(update={"rotation": turned})
+    scene, notes = _surroundings(surroundings)
+    pose = Pose.of(config, place.get("motion", 0.0))
     if config.reflector.scene_object is None:
-        mesh, part_names = _load_reflector(config.reflector)
+        mesh, part_names = _load_reflector(config.reflector, pose)
         assert config.material is not None
         material = _material(config.material, scene)
         reflector = scene.add_object(REFLECTOR_NAME, mesh, material, part_names)
@@ -71,11 +126,14 @@ def build_scene(config: SceneConfig) -> BuiltScene:
     positions = np.asarray(mesh.positions)
     triangles = np.asarray(mesh.triangles)
     parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
-    arc = resolve_arc(config.views, positions)
-    for t in config.views.parameters():
-        if winding_number(positions, triangles, np.array(arc.eye(t))) > 0.5:
+    # The cameras stay where they are when the object moves.
+    cameras = resolve_cameras(config.views, pose.at_rest(positions.astype(np.float64)))
+    for sample in space.samples():
+        eye = cameras.eye(sample)
+        if winding_number(positions, triangles, np.array(eye)) > 0.5:
+            where = f"t = {format_point(sample)}" if len(sample) == 1 else format_point(sample)
             raise InputError(
-                f"views: the eye at t = {t:.4g}, {_vector(arc.eye(t))}, lies inside the reflector; "
+                f"views: the eye at {where}, {_vector(eye)}, lies inside the reflector; "
                 "expected a view from outside"
             )
     return BuiltScene(
@@ -85,7 +143,8 @@ def build_scene(config: SceneConfig) -> BuiltScene:
         triangles=triangles,
         parts=parts,
         part_names=part_names,
-        arc=arc,
+        cameras=cameras,
+        space=space,
         notes=notes,
     )
 
@@ -135,7 +194,7 @@ def _vector(v: tuple[float, float, float]) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in v) + ")"
 
 
-def _load_reflector(reflector: Reflector) -> tuple[_core.TriangleMesh, list[str]]:
+def _load_reflector(reflector: Reflector, pose: Pose) -> tuple[_core.TriangleMesh, list[str]]:
     if reflector.mesh is None:
         mesh = _core.make_teapot(reflector.subdivisions, reflector.height)
     else:
@@ -147,11 +206,11 @@ def _load_reflector(reflector: Reflector) -> tuple[_core.TriangleMesh, list[str]
     split = reflector.object is not None and reflector.parts == "split"
     names = _core.teapot_part_names() if split else [reflector.object or "object"]
     # Rotation and uniform scale leave normals unit vectors.
-    normals = (np.asarray(mesh.normals).astype(np.float64) @ rotation.T).astype(np.float32)
+    normals = np.asarray(mesh.normals).astype(np.float64) @ (pose.rotation @ rotation).T
     placed = _core.TriangleMesh(
-        (positions + np.array(reflector.position)).astype(np.float32),
+        pose.moved(positions + np.array(reflector.position)).astype(np.float32),
         mesh.triangles,
-        normals if len(normals) else None,
+        normals.astype(np.float32) if len(normals) else None,
         mesh.uvs if len(mesh.uvs) else None,
         mesh.parts if split else None,
     )

@@ -9,95 +9,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PlainSerializer,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, field_validator, model_validator
 
 from mirrorbake import _core
+from mirrorbake.scene.config_values import (
+    AUTO,
+    Extinction,
+    Index,
+    MapSize,
+    Reflectance,
+    Section,
+    Vec3,
+)
+from mirrorbake.scene.config_views import Light, Motion, Views
 
 ILLUMINANT = "D65"
 """Under which the colours of metals are meant: the white of Rec.709."""
 
-MAX_IMAGE_SIDE = 16384
-MAX_MAP_SIZE = 4096
 
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _as_rgb(value: Any) -> Any:
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return (value, value, value)
-    return _as_tuple(value)
-
-
-def _power_of_two(value: int) -> int:
-    if value & (value - 1):
-        raise ValueError("Input should be a power of two")
-    return value
-
-
-def _none_for_auto(value: Any) -> Any:
-    return None if value == "auto" else value
-
-
-def _auto_for_none(value: Any) -> Any:
-    return "auto" if value is None else value
-
-
-_AUTO = (BeforeValidator(_none_for_auto), PlainSerializer(_auto_for_none))
-"""Makes None of a file's "auto", and "auto" of None."""
-
-Vec3: TypeAlias = Annotated[tuple[float, float, float], BeforeValidator(_as_tuple)]
-"""Three numbers."""
-
-Reflectance: TypeAlias = Annotated[
-    tuple[
-        Annotated[float, Field(ge=0, le=1)],
-        Annotated[float, Field(ge=0, le=1)],
-        Annotated[float, Field(ge=0, le=1)],
-    ],
-    BeforeValidator(_as_rgb),
-]
-"""R, G, B in [0,1]; one number stands for all three."""
-
-Index: TypeAlias = Annotated[
-    tuple[
-        Annotated[float, Field(gt=0, le=1e6)],
-        Annotated[float, Field(gt=0, le=1e6)],
-        Annotated[float, Field(gt=0, le=1e6)],
-    ],
-    BeforeValidator(_as_rgb),
-]
-"""Real part of a refractive index per channel; one number stands for all three."""
-
-Extinction: TypeAlias = Annotated[
-    tuple[
-        Annotated[float, Field(ge=0, le=1e6)],
-        Annotated[float, Field(ge=0, le=1e6)],
-        Annotated[float, Field(ge=0, le=1e6)],
-    ],
-    BeforeValidator(_as_rgb),
-]
-"""Imaginary part of a refractive index per channel; one number stands for all three."""
-
-ImageSide: TypeAlias = Annotated[int, Field(ge=1, le=MAX_IMAGE_SIDE)]
-MapSize: TypeAlias = Annotated[int, Field(ge=1, le=MAX_MAP_SIZE), AfterValidator(_power_of_two)]
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
-
-
-class Reflector(_Section):
+class Reflector(Section):
     """[reflector]: the shiny object. It stands on y = 0, the table's top or the ground."""
 
     object: Literal["teapot"] | None = None
@@ -134,7 +64,7 @@ class Reflector(_Section):
         return self
 
 
-class MaterialConfig(_Section):
+class MaterialConfig(Section):
     """[material]: what the reflector is made of."""
 
     fresnel: Literal["constant", "schlick", "dielectric", "conductor"] = "schlick"
@@ -179,14 +109,14 @@ class MaterialConfig(_Section):
         return name
 
 
-class Ground(_Section):
+class Ground(Section):
     """[surroundings.ground]: a diffuse disc below the object, for surroundings that have none."""
 
     radius: Annotated[float, Field(gt=0, le=1e4)] = 0.5
     albedo: Reflectance = (0.5, 0.5, 0.5)
 
 
-class Surroundings(_Section):
+class Surroundings(Section):
     """[surroundings]: what the object mirrors."""
 
     room: Literal["furnished"] | None = None
@@ -211,42 +141,15 @@ class Surroundings(_Section):
         return self
 
 
-class Views(_Section):
-    """[views]: the cameras, evenly spaced on an arc about the vertical through `centre`.
-
-    The eye of parameter t in [0,1] is at centre + (radius·sin a, height, radius·cos a), a = start +
-    t·degrees, and looks at the centre.
-    """
-
-    centre: Vec3 | None = None
-    """Default: the middle of the object's bounding box."""
-    radius: Annotated[float, Field(gt=0, le=1e6)] | None = None
-    """Default: so far that the object's bounding sphere fills the frame."""
-    height: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
-    """Of the eye above the centre. Default: the eye looks down at 20 degrees."""
-    start: Annotated[float, Field(ge=-3600, le=3600)] = 0.0
-    degrees: Annotated[float, Field(ge=-360, le=360)] = 99.0
-    """Length of the arc."""
-    count: Annotated[int, Field(ge=1, le=100_000)] = 100
-    fov: Annotated[float, Field(gt=0, lt=180)] = 30.0
-    """Vertical field of view."""
-    size: Annotated[tuple[ImageSide, ImageSide], BeforeValidator(_as_tuple)] = (512, 512)
-    """Pixels: width, height."""
-
-    def parameters(self) -> list[float]:
-        """The parameter t of every view, from 0 to 1 (a single view: 0)."""
-        return [i / (self.count - 1) if self.count > 1 else 0.0 for i in range(self.count)]
-
-
-class Layers(_Section):
+class Layers(Section):
     """[layers]: which layers the reflector gets. None stands for "auto" here and below."""
 
-    diffuse: Annotated[bool | None, *_AUTO] = None
+    diffuse: Annotated[bool | None, *AUTO] = None
     """What the body reflects and emits, as irradiance at the vertices. "auto": if it changes the picture."""
-    local: Annotated[bool | None, *_AUTO] = None
+    local: Annotated[bool | None, *AUTO] = None
     """Maps of the object's reflection in itself. "auto": for the parts whose picture it changes; without it
     a single map per part holds everything."""
-    hull_split: Annotated[bool | None, *_AUTO] = None
+    hull_split: Annotated[bool | None, *AUTO] = None
     """Keeps polygons on the convex hull, which cannot reflect the object, out of the local maps ([PEM] §4).
     "auto": if a view sees any."""
 
@@ -257,12 +160,12 @@ DistantShape: TypeAlias = Literal[
 """What `choose_proxy` fits."""
 
 
-class Maps(_Section):
+class Maps(Section):
     """[maps]: the environment maps."""
 
-    size: Annotated[MapSize | None, *_AUTO] = None
+    size: Annotated[MapSize | None, *AUTO] = None
     """Texels along a side of a cube face, a power of two. "auto": what the views can tell apart."""
-    distant: Annotated[DistantShape | None, *_AUTO] = None
+    distant: Annotated[DistantShape | None, *AUTO] = None
     """Geometry of the distant layer. "auto": the simplest shape that predicts where reflected rays end."""
     box: Literal["angle", "robust", "mean_distance"] = "angle"
     """How a box is fitted to the surroundings that the object sees: to the angles under which the map's
@@ -272,12 +175,12 @@ class Maps(_Section):
     """Storage of the maps on disk."""
 
 
-class Trace(_Section):
+class Trace(Section):
     """[trace]: the ray tracer."""
 
-    samples: Annotated[Annotated[int, Field(ge=1, le=65536)] | None, *_AUTO] = None
+    samples: Annotated[Annotated[int, Field(ge=1, le=65536)] | None, *AUTO] = None
     """Per pixel. "auto": 16, or as many as a rough reflector's lobe needs."""
-    depth: Annotated[Annotated[int, Field(ge=0, le=64)] | None, *_AUTO] = None
+    depth: Annotated[Annotated[int, Field(ge=0, le=64)] | None, *AUTO] = None
     """Specular bounces after the first. "auto": as many as change the picture."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     indirect: Literal["none", "cached", "path"] = "cached"
@@ -286,7 +189,7 @@ class Trace(_Section):
     """Rays per vertex and bounce with which `cached` indirect light is gathered."""
 
 
-class Infer(_Section):
+class Infer(Section):
     """[infer]: how the maps are solved for."""
 
     smoothness: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
@@ -308,7 +211,7 @@ class Infer(_Section):
     """The solver stops when its gradient has shrunk to this fraction."""
 
 
-class Auto(_Section):
+class Auto(Section):
     """[auto]: what the values that are "auto" are decided by."""
 
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.01
@@ -319,7 +222,7 @@ class Auto(_Section):
     """Share of the object's pixels whose reflections may be finer than the maps."""
 
 
-class SceneConfig(_Section):
+class SceneConfig(Section):
     """A whole scene file."""
 
     reflector: Reflector = Reflector(object="teapot")
@@ -327,6 +230,10 @@ class SceneConfig(_Section):
     """None: the material that a `scene_object` has in its file."""
     surroundings: Surroundings = Surroundings(room="furnished")
     views: Views = Views()
+    motion: Motion | None = None
+    """None: the object stays where it is."""
+    light: Light | None = None
+    """None: the light stays as it is."""
     layers: Layers = Layers()
     maps: Maps = Maps()
     trace: Trace = Trace()
@@ -344,9 +251,13 @@ class SceneConfig(_Section):
         return {**data, "material": {}}
 
     @model_validator(mode="after")
-    def _scene_object_has_a_scene(self) -> SceneConfig:
+    def _sections_fit_each_other(self) -> SceneConfig:
         if self.reflector.scene_object is not None and self.surroundings.scene is None:
             raise ValueError("reflector.scene_object needs surroundings.scene, the file that it is in")
+        if self.reflector.scene_object is not None and self.motion is not None:
+            raise ValueError("[motion] has no meaning for reflector.scene_object, which stays where it is")
+        if self.light is not None and self.surroundings.panorama is None:
+            raise ValueError("[light] needs surroundings.panorama, the light that it turns")
         return self
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from mirrorbake import _core
 from mirrorbake.scene.build import BuiltScene, build_scene
 
 if TYPE_CHECKING:
-    from mirrorbake.scene.config import (
-        SceneConfig,
-    )
+    from collections.abc import Mapping
+
+    from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.parameters import ParameterSpace, Point, PointLike
     from mirrorbake.scene.plan import Plan
 
 
@@ -22,6 +23,10 @@ class Stage:
     config: SceneConfig
     built: BuiltScene
     tracer: _core.Tracer
+    moved: dict[Point, Stage] = field(default_factory=dict, compare=False, repr=False)
+    """The last stage that `at` made, by the coordinates that change the scene."""
+    place: Mapping[str, float] = field(default_factory=dict)
+    """Coordinates that have changed the scene, by axis; without any it is at rest."""
 
     @property
     def options(self) -> _core.TraceOptions:
@@ -37,18 +42,47 @@ class Stage:
         """Return the stage with what a plan decides in place of "auto", so that its views can be traced."""
         return replace(self, config=plan.resolve(self.config))
 
-    def visibility(self, t: float) -> _core.SurfaceSamples:
-        """Where the camera of t sees the reflector."""
-        return self.tracer.trace_visibility(self.built.arc.camera(t), self.built.reflector, self.options)
+    @property
+    def space(self) -> ParameterSpace:
+        """The parameter space of the scene file."""
+        return self.built.space
 
-    def trace(self, t: float) -> _core.LayerTrace:
-        """Ray trace the layers of the view of t."""
-        return self.tracer.trace_layers(self.built.arc.camera(t), self.built.reflector, self.options)
+    def at(self, point: PointLike) -> Stage:
+        """Return the stage as it is at a point: with the object moved and the light turned.
+
+        The last one is kept, so that points that differ in the camera alone cost nothing.
+        """
+        place = self.space.scene_coordinates(self.space.point(point))
+        if not any(place.values()):
+            return self
+        key = tuple(place.values())
+        if key not in self.moved:
+            self.moved.clear()
+            self.moved[key] = replace(_prepared(self.config, self.space.point(point)), place=place)
+        return replace(self.moved[key], config=self.config)
+
+    def visibility(self, point: PointLike) -> _core.SurfaceSamples:
+        """Where the camera of a point sees the reflector."""
+        stage, place = self.at(point), self.space.point(point)
+        return stage.tracer.trace_visibility(
+            stage.built.cameras.camera(place), stage.built.reflector, self.options
+        )
+
+    def trace(self, point: PointLike) -> _core.LayerTrace:
+        """Ray trace the layers of the view of a point."""
+        stage, place = self.at(point), self.space.point(point)
+        return stage.tracer.trace_layers(
+            stage.built.cameras.camera(place), stage.built.reflector, self.options
+        )
 
 
 def prepare_stage(config: SceneConfig) -> Stage:
     """Build a scene and make it ready for tracing; raises as `build_scene` does."""
-    built = build_scene(config)
+    return _prepared(config, None)
+
+
+def _prepared(config: SceneConfig, point: Point | None) -> Stage:
+    built = build_scene(config, point)
     options = _core.TracerOptions(
         indirect=getattr(_core.IndirectLight, config.trace.indirect),
         cache_rays=config.trace.cache_rays,

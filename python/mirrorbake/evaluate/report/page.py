@@ -114,7 +114,7 @@ def _head(store: PemStore, evaluation: Evaluation) -> str:
         f"<h1>{html.escape(_name(store))}</h1>",
         f'<p class="lead">{html.escape(verdict(evaluation))}</p>',
     ]
-    count = len(header.parameters)
+    count = len(header.space)
     lines.append(
         f'<p class="soft">{count} view{"s" * (count != 1)} over {abs(views["degrees"]):g}°, {width}×{height} '
         f"pixels, maps of {header.map_size}²×6 texels with all their levels.</p>"
@@ -322,7 +322,7 @@ def megabytes(count: float) -> str:
 
 
 def _cost(store: PemStore, evaluation: Evaluation) -> str:
-    count = len(store.header.parameters)
+    count = len(store.header.space)
     timings = [store.read_timings(index) for index in range(count)]
     group = store.directory / GROUP_NAME
     maps, whole = _bytes(group / "maps"), _bytes(group)

@@ -11,6 +11,7 @@ from mirrorbake.errors import OptionError
 if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.store import PemStore
+    from mirrorbake.scene.parameters import Point
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +45,12 @@ class ShellMap:
 
 @dataclass(frozen=True, eq=False)
 class MapSet:
-    """What draws the reflector at one value of the parameter."""
+    """What draws the reflector at one point of the parameter space."""
 
     name: str
     """`static`, or `sample-0000` and so on."""
-    parameter: float | None
-    """Where it was sampled, 0 to 1; None for the static set."""
+    point: Point | None
+    """Where it was sampled; None for the static set."""
     parts: dict[str, list[ShellMap]]
     """Shells of every part, front to back."""
 
@@ -71,7 +72,7 @@ def sample_set(store: PemStore, index: int) -> MapSet:
         There is no such sample.
     """
     header = store.header
-    count = len(header.parameters)
+    count = len(header.space)
     if not 0 <= index < count:
         raise OptionError(f"sample = {index}: expected 0 to {count - 1}")
     parts = {
@@ -81,4 +82,4 @@ def sample_set(store: PemStore, index: int) -> MapSet:
         ]
         for part in header.parts
     }
-    return MapSet(f"sample-{index:04d}", header.parameters[index], parts)
+    return MapSet(f"sample-{index:04d}", header.space.sample(index), parts)

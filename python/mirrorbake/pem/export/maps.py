@@ -101,7 +101,9 @@ def export_maps(
                     written[id(shell)] = _describe(shell, frame, files, format)
                 entries.append(written[id(shell)])
             parts.append({"name": part, "shells": entries})
-        description["sets"].append({"name": maps.name, "parameter": maps.parameter, "parts": parts})
+        description["sets"].append(
+            {"name": maps.name, "point": None if maps.point is None else list(maps.point), "parts": parts}
+        )
     write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=1) + "\n")
     if clamped and report is not None:
         report(

@@ -1,0 +1,134 @@
+"""Small trial images of a scene, and how much they differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mirrorbake import _core
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from mirrorbake.arrays import FloatArray
+    from mirrorbake.scene.parameters import Point
+    from mirrorbake.scene.stage import Stage
+
+    DoubleArray = NDArray[np.float64]
+
+PROBE_VIEWS = 5
+PROBE_VIEWS_OF_A_DOME = 9
+"""Also of every other space of several axes."""
+PROBE_SIDE = 128
+"""Longer side of the trial images, in pixels."""
+PROBE_SAMPLES = 4
+LOBE_PROBE_SAMPLES = 16
+"""Samples per pixel of the trial images that measure a rough lobe's noise."""
+
+BRIGHTEST_SHARE = 0.01
+"""The brightest pixels are clipped to the next ones, so that one mirrored sun does not decide alone."""
+
+
+def probe_points(stage: Stage) -> list[Point]:
+    space = stage.space
+    if len(space.axes) == 1 and len(space) <= PROBE_VIEWS:
+        return space.samples()
+    return space.spread(PROBE_VIEWS if len(space.axes) < 2 else PROBE_VIEWS_OF_A_DOME)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Samples of small images of a few views, one after the other."""
+
+    view: NDArray[np.int32]
+    pixel: NDArray[np.int64]
+    """Numbered through all views."""
+    part: NDArray[np.int64]
+    triangle: NDArray[np.int64]
+    position: FloatArray
+    reflection: FloatArray
+    beauty: DoubleArray
+    diffuse: DoubleArray
+    fresnel: DoubleArray
+    local: DoubleArray
+    distant: DoubleArray
+
+    @staticmethod
+    def of(stage: Stage, depth: int, samples_per_pixel: int = PROBE_SAMPLES) -> Probe:
+        width, height = stage.built.cameras.size
+        scale = min(1.0, PROBE_SIDE / max(width, height))
+        size = (max(1, round(scale * width)), max(1, round(scale * height)))
+        # The same random numbers at every depth: what differs are the bounces alone.
+        options = _core.TraceOptions(
+            samples_per_pixel=samples_per_pixel, max_specular_depth=depth, seed=stage.config.trace.seed
+        )
+        traces = [
+            moved.tracer.trace_layers(
+                replace(moved.built.cameras, size=size).camera(point), moved.built.reflector, options
+            )
+            for moved, point in ((stage.at(point), point) for point in probe_points(stage))
+        ]
+
+        def joined(name: str) -> NDArray[np.float32]:
+            return np.concatenate([np.asarray(getattr(trace.samples, name)) for trace in traces])
+
+        def light(shell: int) -> NDArray[np.float32]:
+            return np.concatenate([np.asarray(trace.samples.shells[shell].radiance) for trace in traces])
+
+        counts = [len(trace.samples) for trace in traces]
+        view = np.repeat(np.arange(len(traces), dtype=np.int32), counts)
+        return Probe(
+            view=view,
+            pixel=joined("pixel").astype(np.int64) + view.astype(np.int64) * (size[0] * size[1]),
+            part=joined("part").astype(np.int64),
+            triangle=joined("triangle").astype(np.int64),
+            position=joined("position"),
+            reflection=joined("reflection"),
+            beauty=np.concatenate([np.asarray(trace.sample_beauty) for trace in traces]).astype(np.float64),
+            diffuse=joined("diffuse").astype(np.float64),
+            fresnel=joined("fresnel").astype(np.float64),
+            local=light(0).astype(np.float64),
+            distant=light(1)[:, :3].astype(np.float64),
+        )
+
+    @property
+    def incident(self) -> DoubleArray:
+        """Radiance that arrives along the reflected rays."""
+        incident: DoubleArray = self.local[:, :3] + (1.0 - self.local[:, 3:]) * self.distant
+        return incident
+
+
+def pixel_means(values: DoubleArray, pixel: NDArray[np.int64]) -> DoubleArray:
+    _, place, count = np.unique(pixel, return_inverse=True, return_counts=True)
+    sums = [np.bincount(place, weights=values[:, c], minlength=len(count)) for c in range(values.shape[1])]
+    means: DoubleArray = np.stack(sums, axis=-1) / count[:, None]
+    return means
+
+
+def relative_change(with_it: DoubleArray, without: DoubleArray, pixel: NDArray[np.int64]) -> float:
+    """Relative RMS change of the pixels, the brightest clipped."""
+    if not len(pixel):
+        return 0.0
+    a, b = pixel_means(with_it, pixel), pixel_means(without, pixel)
+    # A picture that is black but for a few pixels is judged by those.
+    limit = np.quantile(a, 1.0 - BRIGHTEST_SHARE) or np.inf
+    a, b = np.minimum(a, limit), np.minimum(b, limit)
+    scale = float(np.sqrt(np.mean(a * a)))
+    return float(np.sqrt(np.mean((a - b) ** 2))) / scale if scale > 0.0 else 0.0
+
+
+def relative_spread(values: DoubleArray, pixel: NDArray[np.int64]) -> float:
+    """Standard deviation of a pixel's samples over the RMS of the pixels, the brightest clipped."""
+    _, place, count = np.unique(pixel, return_inverse=True, return_counts=True)
+    several = count[place] > 1
+    if not several.any():
+        return 0.0
+    clipped = np.minimum(values[several], np.quantile(values[several], 1.0 - BRIGHTEST_SHARE))
+    means = pixel_means(clipped, pixel[several])
+    _, place, count = np.unique(pixel[several], return_inverse=True, return_counts=True)
+    squares = np.sum((clipped - means[place]) ** 2, axis=1)
+    variance = np.bincount(place, weights=squares) / (3.0 * (count - 1))
+    scale = float(np.sqrt(np.mean(means * means)))
+    return float(np.sqrt(np.mean(variance))) / scale if scale > 0.0 else 0.0

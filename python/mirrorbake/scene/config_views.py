@@ -1,0 +1,98 @@
+"""The sections of a scene file that span the parameter space: [views], [motion] and [light]."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from mirrorbake.scene.config_values import ImageSide, Section, Vec3, as_tuple
+
+_DOME = {"degrees": 360.0, "count": 12}
+"""Defaults of a dome where they are not an arc's."""
+
+_MEANINGLESS: Mapping[str, tuple[str, ...]] = {
+    "arc": ("elevation", "rings"),
+    "dome": ("height",),
+    "fixed": ("elevation", "rings", "degrees", "count"),
+}
+"""Keys that a kind of views does not know."""
+
+Elevation = Annotated[float, Field(ge=-89, le=89)]
+
+
+class Views(Section):
+    """[views]: where the cameras are.
+
+    `arc`: evenly spaced on an arc about the vertical through `centre`. The eye of parameter t in [0,1] is at
+    centre + (radius·sin a, height, radius·cos a), a = start + t·degrees, and looks at the centre.
+
+    `dome`: over a part of a sphere about `centre`, `count` azimuths by `rings` elevations.
+
+    `fixed`: a single camera, where an arc would start.
+    """
+
+    kind: Literal["arc", "dome", "fixed"] = "arc"
+    centre: Vec3 | None = None
+    """Default: the middle of the object's bounding box."""
+    radius: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    """Of the arc, or of the dome's sphere. Default: so far that the object's bounding sphere fills the
+    frame."""
+    height: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
+    """Of the eye above the centre (`arc`, `fixed`). Default: the eye looks down at 20 degrees."""
+    start: Annotated[float, Field(ge=-3600, le=3600)] = 0.0
+    degrees: Annotated[float, Field(ge=-360, le=360)] = 99.0
+    """Length of the arc, or of the dome's azimuths, which close at 360. Default of domes: 360."""
+    elevation: Annotated[tuple[Elevation, Elevation], BeforeValidator(as_tuple)] = (5.0, 60.0)
+    """Of a dome: the lowest and the highest above the horizon."""
+    count: Annotated[int, Field(ge=1, le=100_000)] = 100
+    """Maps along the arc, or along a ring of the dome (default there: 12)."""
+    rings: Annotated[int, Field(ge=1, le=1000)] = 3
+    """Maps of a dome from its lowest to its highest elevation."""
+    fov: Annotated[float, Field(gt=0, lt=180)] = 30.0
+    """Vertical field of view."""
+    size: Annotated[tuple[ImageSide, ImageSide], BeforeValidator(as_tuple)] = (512, 512)
+    """Pixels: width, height."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _defaults_of_domes(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and data.get("kind") == "dome":
+            return {**_DOME, **data}
+        return data
+
+    @model_validator(mode="after")
+    def _keys_fit_the_kind(self) -> Views:
+        for key in _MEANINGLESS[self.kind]:
+            if getattr(self, key) != type(self).model_fields[key].default:
+                raise ValueError(f"`{key}` has no meaning for kind = {self.kind!r}")
+        if self.elevation[0] > self.elevation[1]:
+            raise ValueError(f"elevation = {list(self.elevation)}: expected the lower one first")
+        return self
+
+
+class Motion(Section):
+    """[motion]: an axis of the parameter space along which the object moves, from 0 to 1."""
+
+    count: Annotated[int, Field(ge=1, le=100_000)] = 5
+    """Maps along the axis."""
+    to: Vec3 = (0.0, 0.0, 0.0)
+    """How far the object has moved at 1, in metres."""
+    turn: Annotated[float, Field(ge=-3600, le=3600)] = 0.0
+    """How far it has turned about the vertical through the centre of its base at 1, in degrees."""
+
+    @model_validator(mode="after")
+    def _moves(self) -> Motion:
+        if not any(self.to) and not self.turn:
+            raise ValueError("give `to` or `turn`: the object does not move")
+        return self
+
+
+class Light(Section):
+    """[light]: an axis of the parameter space along which the panorama turns, from 0 to 1."""
+
+    count: Annotated[int, Field(ge=1, le=100_000)] = 5
+    """Maps along the axis."""
+    turn: Annotated[float, Field(ge=-3600, le=3600)] = 90.0
+    """Of the panorama at 1, in degrees, counter-clockwise about +Y seen from above."""

@@ -37,7 +37,7 @@ def cases() -> Iterator[Case]:
 
     layout = core.CubePyramidLayout(128)
     matrix = core.build_rendering_matrix(samples, 0, core.Proxy.infinite(), layout)
-    target = matrix.average(samples, 0, np.asarray(samples.shells[1].radiance)[:, :3])
+    target = matrix.average(np.asarray(samples.shells[1].radiance)[:, :3])
     peer = scipy.sparse.csr_array(
         (matrix.weights, matrix.texels.astype(np.int32), matrix.row_offsets.astype(np.int32)),
         shape=(matrix.rows, matrix.columns),
@@ -70,8 +70,8 @@ def cases() -> Iterator[Case]:
     start = np.zeros((matrix.columns, 3), np.float32)
 
     def solve() -> FloatArray:
-        solver = core.MapSolver(matrix, weights, layout, options)
-        return solver.solve(target, initial=start)[0]
+        solver = core.MapSolver([(matrix, [(0, 1.0)])], [layout], options=options)
+        return solver.solve([target], [weights], initial=start)[0]
 
     def solve_peer() -> FloatArray:
         channels = [

@@ -1,10 +1,12 @@
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
 #include <optional>
 
 #include "bind.hpp"
 #include "mirrorbake/envmap/cube_pyramid.hpp"
+#include "mirrorbake/envmap/texel_topology.hpp"
 #include "mirrorbake/inference/map_solver.hpp"
 #include "mirrorbake/inference/rendering_matrix.hpp"
 
@@ -64,14 +66,26 @@ void bind_inference(nb::module_& m) {
       "the mean of the "
       "finer one's 2x2 texels weighted by their solid angles ([EMT] section 2.4).");
 
-  nb::class_<LookupOptions>(m, "LookupOptions", "How a renderer reads the map.")
+  nb::class_<TexelTopology>(m, "TexelTopology",
+                            "How the texels of a map with mip levels lie to each other. Numbered as the "
+                            "values of an EnvMap are: levels "
+                            "from the\nfinest, in a level the faces, in a face the rows from the top.")
+      .def(nb::init_implicit<const CubePyramidLayout&>())
+      .def_static("cube", &TexelTopology::cube, nb::arg("size"), "Six faces; a power of two, 1 to 16384.")
+      .def_static("dual_paraboloid", &TexelTopology::dual_paraboloid, nb::arg("size"),
+                  "Two faces, front first; a power of two, 1 to 16384.")
+      .def_static("atlas", &TexelTopology::atlas, nb::arg("width"), nb::arg("height"),
+                  "One sheet on texture coordinates; powers of two, 1 to 16384.")
+      .def_prop_ro("texels", &TexelTopology::texels, "Number of texels of all levels.")
+      .def_prop_ro("levels", &TexelTopology::levels)
+      .def_prop_ro("faces", &TexelTopology::faces)
+      .def("level_offset", &TexelTopology::level_offset, nb::arg("level"), "Index of a level's first texel.")
+      .def("width", &TexelTopology::width, nb::arg("level") = 0, "Texels of a face of a level.")
+      .def("height", &TexelTopology::height, nb::arg("level") = 0, "Texels of a face of a level.")
       .def(
-          "__init__",
-          [](LookupOptions* self, float footprint_scale) { new (self) LookupOptions{footprint_scale}; },
-          nb::kw_only(), nb::arg("footprint_scale") = LookupOptions{}.footprint_scale)
-      .def_rw(
-          "footprint_scale", &LookupOptions::footprint_scale,
-          "Size of a lookup's footprint in pixels, in (0, 1024]. 1: the pixel's, as graphics hardware does.");
+          "__eq__", [](const TexelTopology& a, const TexelTopology& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"));
+  nb::implicitly_convertible<CubePyramidLayout, TexelTopology>();
 
   nb::class_<RenderingMatrix>(
       m, "RenderingMatrix",
@@ -101,26 +115,25 @@ void bind_inference(nb::module_& m) {
           "uint32 (rows,): y * width + x of each row's pixel.")
       .def_prop_ro(
           "row_samples",
-          [](nb::handle self) {
-            return scalars_view(nb::cast<const RenderingMatrix&>(self).row_samples, self);
+          [](const RenderingMatrix& self) {
+            std::vector<std::uint32_t> counts(self.member_offsets.empty() ? 0 : self.rows());
+            for (std::size_t r = 0; r < counts.size(); ++r) counts[r] = self.row_samples(r);
+            const std::size_t rows = counts.size();
+            return to_numpy(std::move(counts), {rows});
           },
-          "uint32 (rows,): how many samples of the pixel see the part.")
+          nb::rv_policy::move, "uint32 (rows,): how many samples of the pixel see the part.")
       .def(
           "average",
-          [](const RenderingMatrix& self, const SurfaceSamples& samples, int part, Matrix values,
-             const std::optional<ByteArray>& triangles) {
-            const SampleSelection selection = select(part, triangles);
+          [](const RenderingMatrix& self, Matrix values) {
             std::vector<float> target;
             {
               const nb::gil_scoped_release unlocked;
-              target = average_over_rows(self, samples, selection, flat(values),
-                                         static_cast<int>(values.shape(1)));
+              target = average_over_rows(self, flat(values), static_cast<int>(values.shape(1)));
             }
             return to_numpy(std::move(target), {self.rows(), values.shape(1)});
           },
-          nb::arg("samples"), nb::arg("part"), nb::arg("values"), nb::arg("triangles") = nb::none(),
-          "Mean of per-sample values, float32 (len(samples), C), over each row's samples: float32 (rows, C). "
-          "`part` and\n`triangles` are those that the matrix was built of.")
+          nb::arg("values"),
+          "Mean of per-sample values, float32 (samples, C), over each row's samples: float32 (rows, C).")
       .def(
           "multiply",
           [](const RenderingMatrix& self, Matrix x) {
@@ -135,14 +148,19 @@ void bind_inference(nb::module_& m) {
 
   m.def(
       "build_rendering_matrix",
-      [](const SurfaceSamples& samples, int part, const Proxy& proxy, const CubePyramidLayout& layout,
-         const LookupOptions& options, const std::optional<ByteArray>& triangles) {
+      [](const SurfaceSamples& samples, int part, const Proxy& proxy, const TexelTopology& topology,
+         const RunTimeModel& run_time, const std::optional<ByteArray>& triangles) {
         const SampleSelection selection = select(part, triangles);
         const nb::gil_scoped_release unlocked;
-        return build_rendering_matrix(samples, selection, proxy, layout, options);
+        return build_rendering_matrix(samples, selection, proxy, topology, run_time);
       },
-      nb::arg("samples"), nb::arg("part"), nb::arg("proxy"), nb::arg("layout"),
-      nb::arg("options") = LookupOptions{}, nb::arg("triangles") = nb::none(),
+      nb::arg("samples"), nb::arg("part"), nb::arg("proxy"), nb::arg("topology"),
+      nb::arg("run_time") = reference_run_time(), nb::arg("triangles") = nb::none(),
+      nb::sig("def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, topology: "
+              "TexelTopology | "
+              "CubePyramidLayout, run_time: RunTimeModel = ..., triangles: numpy.typing.NDArray[numpy.uint8] "
+              "| None "
+              "= None) -> RenderingMatrix"),
       "Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups. "
       "`triangles`: uint8,\n0 for each triangle of the reflector whose samples are left out; None: all "
       "count.");
@@ -152,11 +170,11 @@ void bind_inference(nb::module_& m) {
       [](const RenderingMatrix& matrix, int samples_per_pixel, Matrix target) {
         const int channels = static_cast<int>(target.shape(1));
         return to_numpy(display_row_weights(matrix, samples_per_pixel, flat(target), channels),
-                        {matrix.rows()});
+                        {matrix.rows(), target.shape(1)});
       },
       nb::arg("matrix"), nb::arg("samples_per_pixel"), nb::arg("target"),
       "Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2, float32 "
-      "(rows,).");
+      "(rows, C).");
 
   nb::class_<SolveOptions>(m, "SolveOptions", "Weights of the regulariser and when to stop.")
       .def(
@@ -183,44 +201,76 @@ void bind_inference(nb::module_& m) {
   nb::class_<SolveReport>(m, "SolveReport", "What a solve did.")
       .def_ro("iterations", &SolveReport::iterations)
       .def_ro("rounds", &SolveReport::rounds, "Of the active set that keeps the map within its bounds.")
+      .def_ro("converged", &SolveReport::converged,
+              "The gradient met the tolerance, and the bounds are settled.")
       .def_ro("relative_gradient", &SolveReport::relative_gradient, "What `tolerance` is compared with.")
       .def_ro("unknowns", &SolveReport::unknowns, "Texels that some row sees.")
       .def_ro("rms_error", &SolveReport::rms_error, "Weighted root mean square of A x - b.");
 
-  nb::class_<MapSolver>(
-      m, "MapSolver",
-      "Regularised least squares for maps of one rendering matrix ([PEM] section 4): what all solves "
-      "share is computed once.")
+  using Nodes = std::vector<std::pair<int, float>>;
+  nb::class_<MapSolver>(m, "MapSolver",
+                        "Regularised least squares for the maps of one or several nodes, seen by one or "
+                        "several views ([PEM] section "
+                        "4): what\nall solves share is computed once.")
       .def(
           "__init__",
-          [](MapSolver* self, const RenderingMatrix& matrix, Vector row_weights,
-             const CubePyramidLayout& layout, const SolveOptions& options) {
+          [](MapSolver* self, const std::vector<std::pair<const RenderingMatrix*, Nodes>>& views,
+             const std::vector<TexelTopology>& maps, int nodes, const SolveOptions& options) {
+            std::vector<SolverView> solver_views;
+            for (const auto& [matrix, blend] : views) {
+              SolverView& view = solver_views.emplace_back(SolverView{matrix, {}});
+              for (const auto& [node, weight] : blend) view.nodes.push_back({node, weight});
+            }
             const nb::gil_scoped_release unlocked;
-            new (self) MapSolver(matrix, {row_weights.data(), row_weights.size()}, layout, options);
+            new (self) MapSolver(solver_views, maps, nodes, options);
           },
-          nb::arg("matrix"), nb::arg("row_weights"), nb::arg("layout"), nb::arg("options") = SolveOptions{})
+          nb::arg("views"), nb::arg("maps"), nb::arg("nodes") = 1, nb::arg("options") = SolveOptions{},
+          nb::keep_alive<1, 2>(),
+          nb::sig("def __init__(self, views: collections.abc.Sequence[tuple[RenderingMatrix, "
+                  "collections.abc.Sequence[tuple[int, float]]]], maps: "
+                  "collections.abc.Sequence[TexelTopology | CubePyramidLayout], nodes: int = 1, options: "
+                  "SolveOptions "
+                  "= ...) -> None"),
+          "views: matrices, each with the nodes whose maps it sees and their weights in the blend: [(0, "
+          "1.0)] for the "
+          "only\none. maps: those of a node, stacked as the columns are.")
       .def(
           "solve",
-          [](const MapSolver& self, Matrix target, std::optional<Matrix> prior,
+          [](const MapSolver& self, const std::vector<Matrix>& targets,
+             const std::vector<Matrix>& row_weights, std::optional<Matrix> prior,
              std::optional<Matrix> initial) {
-            const std::size_t channels = target.shape(1);
+            if (targets.size() != row_weights.size())
+              throw nb::value_error("row_weights: expected one per target");
+            const std::size_t channels = targets.empty() ? 1 : targets.front().shape(1);
+            std::vector<ViewTarget> views;
+            for (std::size_t v = 0; v < targets.size(); ++v) {
+              views.push_back({flat(targets[v]), flat(row_weights[v])});
+            }
+            SolveProblem problem;
+            problem.channels = static_cast<int>(channels);
+            problem.views = views;
+            problem.prior = flat(prior);
+            problem.initial = flat(initial);
             MapSolution solution;
             {
               const nb::gil_scoped_release unlocked;
-              solution = self.solve(flat(target), static_cast<int>(channels), flat(prior), flat(initial));
+              solution = self.solve(problem);
             }
-            const std::size_t texels = channels == 0 ? 0 : solution.texels.size() / channels;
+            const std::size_t texels = solution.texels.size() / channels;
             return nb::make_tuple(to_numpy(std::move(solution.texels), {texels, channels}), solution.report);
           },
-          nb::arg("target"), nb::arg("prior") = nb::none(), nb::arg("initial") = nb::none(),
-          nb::sig("def solve(self, target: numpy.typing.NDArray[numpy.float32], prior: "
-                  "numpy.typing.NDArray[numpy.float32] "
-                  "| None = None, initial: numpy.typing.NDArray[numpy.float32] | None = None) -> "
+          nb::arg("targets"), nb::arg("row_weights"), nb::arg("prior") = nb::none(),
+          nb::arg("initial") = nb::none(),
+          nb::sig("def solve(self, targets: collections.abc.Sequence[numpy.typing.NDArray[numpy.float32]], "
+                  "row_weights: collections.abc.Sequence[numpy.typing.NDArray[numpy.float32]], prior: "
+                  "numpy.typing.NDArray[numpy.float32] | None = None, initial: "
+                  "numpy.typing.NDArray[numpy.float32] | None = None) -> "
                   "tuple[numpy.typing.NDArray[numpy.float32], SolveReport]"),
-          "Solves for a map.\n\ntarget: float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior, "
-          "initial: float32 "
-          "(texels, C). Returns the map, float32 (texels, C), within [0, inf) (coverage in [0, 1]), and "
-          "a report.");
+          "Solves for the maps.\n\ntargets, row_weights: of each view, float32 (rows, C), 1 to 4 channels, "
+          "the "
+          "fourth is coverage. prior, initial:\nfloat32 (nodes * texels, C). Returns the maps, float32 "
+          "(nodes * "
+          "texels, C), within [0, inf) (coverage in [0, 1]),\nand a report.");
 }
 
 }  // namespace mirrorbake::bindings

@@ -9,66 +9,68 @@
 namespace mirrorbake::bindings {
 namespace {
 
-// Maps of one part, which keep their arrays alive.
-struct OwnedPartMaps {
-  Proxy local_proxy;
-  std::optional<FloatMatrix> local;
-  std::optional<ByteArray> local_triangles;
-  Proxy distant_proxy;
-  FloatMatrix distant;
+// A shell's map, which keeps its arrays alive.
+struct OwnedShellMap {
+  Proxy proxy;
+  TexelTopology topology;
+  FloatMatrix texels;
+  std::optional<ByteArray> triangles;
+
+  ShellMap view() const {
+    ShellMap map{proxy, topology, {texels.data(), texels.size()}};
+    if (triangles) map.triangles = {triangles->data(), triangles->size()};
+    return map;
+  }
 };
 
 }  // namespace
 
 void bind_pem(nb::module_& m) {
-  nb::class_<OwnedPartMaps>(m, "PartMaps", "Environment maps of one part of the reflector.")
+  nb::class_<OwnedShellMap>(m, "ShellMap", "The map of one shell, as a part of the reflector reads it.")
       .def(
           "__init__",
-          [](OwnedPartMaps* self, const Proxy& distant_proxy, FloatMatrix distant, const Proxy& local_proxy,
-             std::optional<FloatMatrix> local, std::optional<ByteArray> local_triangles) {
-            new (self) OwnedPartMaps{local_proxy, std::move(local), std::move(local_triangles), distant_proxy,
-                                     std::move(distant)};
+          [](OwnedShellMap* self, const Proxy& proxy, const TexelTopology& topology, FloatMatrix texels,
+             std::optional<ByteArray> triangles) {
+            new (self) OwnedShellMap{proxy, topology, std::move(texels), std::move(triangles)};
           },
-          nb::arg("distant_proxy"), nb::arg("distant"), nb::arg("local_proxy") = Proxy{},
-          nb::arg("local") = nb::none(), nb::arg("local_triangles") = nb::none(),
-          "distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part "
-          "without\na local layer. local_triangles: uint8, 0 for each triangle of the reflector that the "
-          "local "
-          "layer leaves out,\nor None if it covers all.");
+          nb::arg("proxy"), nb::arg("topology"), nb::arg("texels"), nb::arg("triangles") = nb::none(),
+          nb::sig("def __init__(self, proxy: Proxy, topology: TexelTopology | CubePyramidLayout, texels: "
+                  "numpy.typing.NDArray[numpy.float32], triangles: numpy.typing.NDArray[numpy.uint8] | None "
+                  "= None) "
+                  "-> None"),
+          "texels: float32 (texels, 4), premultiplied RGBA, or (texels, 3), opaque. triangles: uint8, 0 for "
+          "each "
+          "triangle of\nthe reflector that the shell leaves out, or None if it covers all.");
 
   m.def(
       "render_reflector",
-      [](const SurfaceSamples& samples, const std::vector<const OwnedPartMaps*>& parts,
-         const CubePyramidLayout& layout, std::optional<PointArray> diffuse, const LookupOptions& options) {
-        std::vector<PartMaps> views;
-        for (const OwnedPartMaps* part : parts) {
-          PartMaps view;
-          view.local_proxy = part->local_proxy;
-          view.distant_proxy = part->distant_proxy;
-          view.distant = {part->distant.data(), part->distant.size()};
-          if (part->local) view.local = {part->local->data(), part->local->size()};
-          if (part->local_triangles) {
-            view.local_triangles = {part->local_triangles->data(), part->local_triangles->size()};
-          }
-          views.push_back(view);
+      [](const SurfaceSamples& samples, const std::vector<std::vector<const OwnedShellMap*>>& parts,
+         std::optional<PointArray> diffuse, const RunTimeModel& run_time) {
+        std::vector<PartShells> views;
+        for (const auto& shells : parts) {
+          PartShells& part = views.emplace_back();
+          for (const OwnedShellMap* shell : shells) part.push_back(shell->view());
         }
         std::span<const glm::vec3> diffuse_view;
         if (diffuse) diffuse_view = {reinterpret_cast<const glm::vec3*>(diffuse->data()), diffuse->shape(0)};
         Image image;
         {
           const nb::gil_scoped_release unlocked;
-          image = render_reflector(samples, views, layout, diffuse_view, options);
+          image = render_reflector(samples, views, diffuse_view, run_time);
         }
         return to_numpy(std::move(image.pixels),
                         {static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width), 4});
       },
-      nb::arg("samples"), nb::arg("parts"), nb::arg("layout"), nb::arg("diffuse") = nb::none(),
-      nb::arg("options") = LookupOptions{},
-      "Draws the reflector from its maps: (L_local + (1 - alpha) L_distant) F + D per sample, averaged over "
-      "the pixel.\n\n"
-      "diffuse: float32 (len(samples), 3) or None for black. Returns float32 (H, W, 4): light times "
-      "coverage, and "
-      "coverage.");
+      nb::arg("samples"), nb::arg("parts"), nb::arg("diffuse") = nb::none(),
+      nb::arg("run_time") = reference_run_time(),
+      nb::sig("def render_reflector(samples: SurfaceSamples, parts: "
+              "collections.abc.Sequence[collections.abc.Sequence[ShellMap]], diffuse: "
+              "numpy.typing.NDArray[numpy.float32] | None = None, run_time: RunTimeModel = ...) -> "
+              "numpy.typing.NDArray[numpy.float32]"),
+      "Draws the reflector from its maps: (L0 + (1 - a0)(L1 + ...)) F + D per sample, averaged over the "
+      "pixel.\n\nparts: the shells of each part, front to back. diffuse: float32 (len(samples), 3) or None "
+      "for "
+      "black.\nReturns float32 (H, W, 4): light times coverage, and coverage.");
 
   m.def(
       "diffuse_from_irradiance",

@@ -93,16 +93,12 @@ void bind_run_time(nb::module_& m) {
       .def(
           "__init__",
           [](RunTimeModel* self, std::string name, std::vector<glm::vec2> places, float footprint_scale,
-             const std::string& filter, int max_taps, const std::string& coordinates,
-             const std::string& fresnel, int texel_bits) {
-            new (self) RunTimeModel(checked(
-                {std::move(name), std::move(places), footprint_scale, parse_lookup_filter(filter), max_taps,
-                 parse_coordinate_source(coordinates), parse_fresnel_source(fresnel), texel_bits}));
+             const std::string& filter, int max_taps) {
+            new (self) RunTimeModel(checked({std::move(name), std::move(places), footprint_scale,
+                                             parse_lookup_filter(filter), max_taps}));
           },
           nb::kw_only(), nb::arg("name"), nb::arg("places"), nb::arg("footprint_scale"),
-          nb::arg("filter") = "anisotropic", nb::arg("max_taps") = web.max_taps,
-          nb::arg("coordinates") = "per_pixel", nb::arg("fresnel") = "exact",
-          nb::arg("texel_bits") = RunTimeModel{}.texel_bits)
+          nb::arg("filter") = "anisotropic", nb::arg("max_taps") = web.max_taps)
       .def_ro("name", &RunTimeModel::name)
       .def_ro("places", &RunTimeModel::places,
               "Where in a pixel the lookups lie: (x, y) in [0, 1) from its top left corner.")
@@ -111,15 +107,7 @@ void bind_run_time(nb::module_& m) {
       .def_prop_ro(
           "filter", [](const RunTimeModel& self) { return std::string(name_of(self.filter)); },
           "nearest, bilinear, trilinear or anisotropic.")
-      .def_ro("max_taps", &RunTimeModel::max_taps, "Of `anisotropic`, 1 to 16.")
-      .def_prop_ro(
-          "coordinates", [](const RunTimeModel& self) { return std::string(name_of(self.coordinates)); },
-          "per_pixel or per_vertex.")
-      .def_prop_ro(
-          "fresnel", [](const RunTimeModel& self) { return std::string(name_of(self.fresnel)); },
-          "exact, table or schlick.")
-      .def_ro("texel_bits", &RunTimeModel::texel_bits,
-              "Of a channel in the texture format: 32, 16 (half) or 9 (shared exponent, RGB9E5).")
+      .def_ro("max_taps", &RunTimeModel::max_taps, "Of `anisotropic`: 1, or an even number up to 16.")
       .def(
           "__eq__", [](const RunTimeModel& a, const RunTimeModel& b) { return a == b; }, nb::is_operator(),
           nb::sig("def __eq__(self, other: object, /) -> bool"));

@@ -934,7 +934,7 @@ class RunTimeModel:
     How the renderer that will draw the maps reads them: what a map is inferred for.
     """
 
-    def __init__(self, *, name: str, places: Sequence[Sequence[float]], footprint_scale: float, filter: str = 'anisotropic', max_taps: int = 4, coordinates: str = 'per_pixel', fresnel: str = 'exact', texel_bits: int = 16) -> None: ...
+    def __init__(self, *, name: str, places: Sequence[Sequence[float]], footprint_scale: float, filter: str = 'anisotropic', max_taps: int = 4) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -955,21 +955,7 @@ class RunTimeModel:
 
     @property
     def max_taps(self) -> int:
-        """Of `anisotropic`, 1 to 16."""
-
-    @property
-    def coordinates(self) -> str:
-        """per_pixel or per_vertex."""
-
-    @property
-    def fresnel(self) -> str:
-        """exact, table or schlick."""
-
-    @property
-    def texel_bits(self) -> int:
-        """
-        Of a channel in the texture format: 32, 16 (half) or 9 (shared exponent, RGB9E5).
-        """
+        """Of `anisotropic`: 1, or an even number up to 16."""
 
     def __eq__(self, other: object, /) -> bool: ...
 
@@ -1444,19 +1430,46 @@ def build_cube_pyramid(faces: Annotated[NDArray[numpy.float32], dict(shape=(6, N
     faces: float32 (6, N, N, C). Returns float32 (texels, C): every level is the mean of the finer one's 2x2 texels weighted by their solid angles ([EMT] section 2.4).
     """
 
-class LookupOptions:
-    """How a renderer reads the map."""
+class TexelTopology:
+    """
+    How the texels of a map with mip levels lie to each other. Numbered as the values of an EnvMap are: levels from the
+    finest, in a level the faces, in a face the rows from the top.
+    """
 
-    def __init__(self, *, footprint_scale: float = 0.25) -> None: ...
+    def __init__(self, arg: CubePyramidLayout, /) -> None: ...
+
+    @staticmethod
+    def cube(size: int) -> TexelTopology:
+        """Six faces; a power of two, 1 to 16384."""
+
+    @staticmethod
+    def dual_paraboloid(size: int) -> TexelTopology:
+        """Two faces, front first; a power of two, 1 to 16384."""
+
+    @staticmethod
+    def atlas(width: int, height: int) -> TexelTopology:
+        """One sheet on texture coordinates; powers of two, 1 to 16384."""
 
     @property
-    def footprint_scale(self) -> float:
-        """
-        Size of a lookup's footprint in pixels, in (0, 1024]. 1: the pixel's, as graphics hardware does.
-        """
+    def texels(self) -> int:
+        """Number of texels of all levels."""
 
-    @footprint_scale.setter
-    def footprint_scale(self, arg: float, /) -> None: ...
+    @property
+    def levels(self) -> int: ...
+
+    @property
+    def faces(self) -> int: ...
+
+    def level_offset(self, level: int) -> int:
+        """Index of a level's first texel."""
+
+    def width(self, level: int = 0) -> int:
+        """Texels of a face of a level."""
+
+    def height(self, level: int = 0) -> int:
+        """Texels of a face of a level."""
+
+    def __eq__(self, other: object, /) -> bool: ...
 
 class RenderingMatrix:
     """
@@ -1489,19 +1502,18 @@ class RenderingMatrix:
         """uint32 (rows,): y * width + x of each row's pixel."""
 
     @property
-    def row_samples(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
+    def row_samples(self) -> NDArray[numpy.uint32]:
         """uint32 (rows,): how many samples of the pixel see the part."""
 
-    def average(self, samples: SurfaceSamples, part: int, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> NDArray[numpy.float32]:
+    def average(self, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """
-        Mean of per-sample values, float32 (len(samples), C), over each row's samples: float32 (rows, C). `part` and
-        `triangles` are those that the matrix was built of.
+        Mean of per-sample values, float32 (samples, C), over each row's samples: float32 (rows, C).
         """
 
     def multiply(self, x: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """b = A x for x float32 (columns, C): float32 (rows, C)."""
 
-def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, layout: CubePyramidLayout, options: LookupOptions = ..., triangles: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> RenderingMatrix:
+def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, topology: TexelTopology | CubePyramidLayout, run_time: RunTimeModel = ..., triangles: numpy.typing.NDArray[numpy.uint8] | None = None) -> RenderingMatrix:
     """
     Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups. `triangles`: uint8,
     0 for each triangle of the reflector whose samples are left out; None: all count.
@@ -1509,7 +1521,7 @@ def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, lay
 
 def display_row_weights(matrix: RenderingMatrix, samples_per_pixel: int, target: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
     """
-    Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2, float32 (rows,).
+    Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2, float32 (rows, C).
     """
 
 class SolveOptions:
@@ -1565,6 +1577,10 @@ class SolveReport:
         """Of the active set that keeps the map within its bounds."""
 
     @property
+    def converged(self) -> bool:
+        """The gradient met the tolerance, and the bounds are settled."""
+
+    @property
     def relative_gradient(self) -> float:
         """What `tolerance` is compared with."""
 
@@ -1578,33 +1594,40 @@ class SolveReport:
 
 class MapSolver:
     """
-    Regularised least squares for maps of one rendering matrix ([PEM] section 4): what all solves share is computed once.
+    Regularised least squares for the maps of one or several nodes, seen by one or several views ([PEM] section 4): what
+    all solves share is computed once.
     """
 
-    def __init__(self, matrix: RenderingMatrix, row_weights: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], layout: CubePyramidLayout, options: SolveOptions = ...) -> None: ...
-
-    def solve(self, target: numpy.typing.NDArray[numpy.float32], prior: numpy.typing.NDArray[numpy.float32] | None = None, initial: numpy.typing.NDArray[numpy.float32] | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], SolveReport]:
+    def __init__(self, views: Sequence[tuple[RenderingMatrix, Sequence[tuple[int, float]]]], maps: Sequence[TexelTopology | CubePyramidLayout], nodes: int = 1, options: SolveOptions = ...) -> None:
         """
-        Solves for a map.
-
-        target: float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior, initial: float32 (texels, C). Returns the map, float32 (texels, C), within [0, inf) (coverage in [0, 1]), and a report.
+        views: matrices, each with the nodes whose maps it sees and their weights in the blend: [(0, 1.0)] for the only
+        one. maps: those of a node, stacked as the columns are.
         """
 
-class PartMaps:
-    """Environment maps of one part of the reflector."""
-
-    def __init__(self, distant_proxy: Proxy, distant: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], local_proxy: Proxy = ..., local: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)] | None = None, local_triangles: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None:
+    def solve(self, targets: Sequence[numpy.typing.NDArray[numpy.float32]], row_weights: Sequence[numpy.typing.NDArray[numpy.float32]], prior: numpy.typing.NDArray[numpy.float32] | None = None, initial: numpy.typing.NDArray[numpy.float32] | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], SolveReport]:
         """
-        distant: float32 (texels, 3). local: float32 (texels, 4), premultiplied RGBA, or None for a part without
-        a local layer. local_triangles: uint8, 0 for each triangle of the reflector that the local layer leaves out,
-        or None if it covers all.
+        Solves for the maps.
+
+        targets, row_weights: of each view, float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior, initial:
+        float32 (nodes * texels, C). Returns the maps, float32 (nodes * texels, C), within [0, inf) (coverage in [0, 1]),
+        and a report.
         """
 
-def render_reflector(samples: SurfaceSamples, parts: Sequence[PartMaps], layout: CubePyramidLayout, diffuse: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, options: LookupOptions = ...) -> NDArray[numpy.float32]:
+class ShellMap:
+    """The map of one shell, as a part of the reflector reads it."""
+
+    def __init__(self, proxy: Proxy, topology: TexelTopology | CubePyramidLayout, texels: numpy.typing.NDArray[numpy.float32], triangles: numpy.typing.NDArray[numpy.uint8] | None = None) -> None:
+        """
+        texels: float32 (texels, 4), premultiplied RGBA, or (texels, 3), opaque. triangles: uint8, 0 for each triangle of
+        the reflector that the shell leaves out, or None if it covers all.
+        """
+
+def render_reflector(samples: SurfaceSamples, parts: Sequence[Sequence[ShellMap]], diffuse: numpy.typing.NDArray[numpy.float32] | None = None, run_time: RunTimeModel = ...) -> numpy.typing.NDArray[numpy.float32]:
     """
-    Draws the reflector from its maps: (L_local + (1 - alpha) L_distant) F + D per sample, averaged over the pixel.
+    Draws the reflector from its maps: (L0 + (1 - a0)(L1 + ...)) F + D per sample, averaged over the pixel.
 
-    diffuse: float32 (len(samples), 3) or None for black. Returns float32 (H, W, 4): light times coverage, and coverage.
+    parts: the shells of each part, front to back. diffuse: float32 (len(samples), 3) or None for black.
+    Returns float32 (H, W, 4): light times coverage, and coverage.
     """
 
 def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], vertex_irradiance: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:

@@ -7,7 +7,7 @@
 
 #include "mirrorbake/core/version.hpp"
 #include "mirrorbake/envmap/cube_pyramid.hpp"
-#include "mirrorbake/envmap/cube_sampling.hpp"
+#include "mirrorbake/envmap/reads.hpp"
 #include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/scene/shapes.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
@@ -31,10 +31,10 @@ int main() {
   const auto layout = mirrorbake::CubePyramidLayout::full(8);
   const std::vector<float> faces(6 * 8 * 8, 3.0F);
   const std::vector<float> pyramid = mirrorbake::build_cube_pyramid(faces, layout, 1);
-  const auto footprint = mirrorbake::trilinear_footprint(layout, glm::vec3(0.3F, -2.0F, 1.0F), 1.25F);
+  const auto reads = mirrorbake::reads(
+      layout, {glm::vec3(0.3F, -2.0F, 1.0F), glm::vec3(0.6F, 0.0F, 0.0F), glm::vec3(0.0F, 0.0F, 0.2F)}, {});
   double radiance = 0.0;
-  for (int i = 0; i < footprint.count; ++i)
-    radiance += footprint.texels[i].weight * pyramid[footprint.texels[i].texel];
+  for (const auto& read : reads) radiance += read.weight * pyramid[read.texel];
   expect("radiance of a uniform environment", radiance, 3.0, 1e-5);
 
   // A ray from the middle of a box of two metres meets its wall after one.

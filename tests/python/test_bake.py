@@ -17,7 +17,7 @@ from mirrorbake.evaluate.demo import demo_config
 from mirrorbake.evaluate.evaluate import Evaluation, evaluate
 from mirrorbake.evaluate.metrics import psnr
 from mirrorbake.pem.opened import OpenedPem, open_pem
-from mirrorbake.pem.run_time import RunTime
+from mirrorbake.pem.run_time import RunTime, lookups_of
 from mirrorbake.pem.store import PemStore
 from mirrorbake.pem.view_images import images_of_trace
 from mirrorbake.proxy import hull_triangles, proxy_from_attributes, proxy_to_attributes
@@ -111,13 +111,16 @@ def test_polygons_on_the_convex_hull_have_no_local_layer(baked: Baked) -> None:
     drawn = pem.run_time.render("pem", 0.0, samples)
     pixel, on_hull = np.asarray(samples.pixel), ~off_hull[np.asarray(samples.triangle)]
     parts = [
-        _core.PartMaps(
-            proxy_from_attributes(part["layers"]["distant"]), pem.store.read_map(part["name"], "distant", 0)
-        )
+        [
+            _core.ShellMap(
+                proxy_from_attributes(part["layers"]["distant"]),
+                _core.TexelTopology.cube(pem.store.header.map_size),
+                pem.store.read_map(part["name"], "distant", 0),
+            )
+        ]
         for part in pem.store.header.parts
     ]
-    layout = _core.CubePyramidLayout(pem.store.header.map_size)
-    image = _core.render_reflector(samples, parts, layout, None, _core.LookupOptions(footprint_scale=0.25))
+    image = _core.render_reflector(samples, parts, None, lookups_of(0.25))
     alone = (image[..., :3] / np.maximum(image[..., 3:], 1e-9)).reshape(-1, 3)
     seen = np.bincount(pixel, minlength=len(alone))
     whole = (seen > 0) & (np.bincount(pixel, weights=on_hull, minlength=len(alone)) == seen)
@@ -144,8 +147,7 @@ def test_between_two_views_the_maps_are_blended_linearly(baked: Baked) -> None:
     store = pem.store
     blended = pem.run_time.render("pem", 0.25, samples)
     split = store.read_local_triangles()
-    layout = _core.CubePyramidLayout(store.header.map_size)
-    options = _core.LookupOptions(footprint_scale=0.25)
+    topology = _core.TexelTopology.cube(store.header.map_size)
     # Compositing (L_local + (1 − α) L_distant) is not linear in α and L_distant together: maps are blended,
     # not pictures.
     parts = []
@@ -155,10 +157,9 @@ def test_between_two_views_the_maps_are_blended_linearly(baked: Baked) -> None:
             for layer in ("local", "distant")
         }
         proxies = {layer: proxy_from_attributes(part["layers"][layer]) for layer in maps}
-        parts.append(
-            _core.PartMaps(proxies["distant"], maps["distant"], proxies["local"], maps["local"], split)
-        )
-    image = _core.render_reflector(samples, parts, layout, None, options)
+        local = _core.ShellMap(proxies["local"], topology, maps["local"], split)
+        parts.append([local, _core.ShellMap(proxies["distant"], topology, maps["distant"])])
+    image = _core.render_reflector(samples, parts, None, lookups_of(0.25))
     expected = image[..., :3] / np.maximum(image[..., 3:], 1e-9)
     np.testing.assert_allclose(blended, expected, rtol=1e-5, atol=1e-6)
 

@@ -52,6 +52,10 @@ def as_scipy(matrix: mb.RenderingMatrix) -> scipy.sparse.csr_array:
     )
 
 
+def solver_of(matrix: mb.RenderingMatrix, options: mb.SolveOptions | None = None) -> mb.MapSolver:
+    return mb.MapSolver([(matrix, [(0, 1.0)])], [LAYOUT], options=options or mb.SolveOptions())
+
+
 def random_map(channels: int) -> NDArray[np.float32]:
     return np.random.default_rng(5).random((LAYOUT.texels, channels), np.float32)
 
@@ -91,12 +95,12 @@ def test_multiply_is_the_sparse_product(matrix: mb.RenderingMatrix) -> None:
 
 def test_average_is_the_mean_of_the_row(trace: mb.LayerTrace, matrix: mb.RenderingMatrix) -> None:
     pixel = np.asarray(trace.samples.pixel, np.float32)[:, None]
-    np.testing.assert_array_equal(matrix.average(trace.samples, 0, pixel)[:, 0], matrix.row_pixels)
+    np.testing.assert_array_equal(matrix.average(pixel)[:, 0], matrix.row_pixels)
 
 
 def test_renderer_draws_what_the_matrix_says(trace: mb.LayerTrace, matrix: mb.RenderingMatrix) -> None:
     x = random_map(3)
-    image = mb.render_reflector(trace.samples, [mb.PartMaps(PROXY, x)], LAYOUT)
+    image = mb.render_reflector(trace.samples, [[mb.ShellMap(PROXY, LAYOUT, x)]])
     drawn = image.reshape(-1, 4)[matrix.row_pixels]
     coverage = matrix.row_samples[:, None] / SAMPLES
     np.testing.assert_allclose(drawn[:, :3], coverage * matrix.multiply(x), rtol=1e-5)
@@ -106,10 +110,11 @@ def test_renderer_draws_what_the_matrix_says(trace: mb.LayerTrace, matrix: mb.Re
 def test_inferred_map_reproduces_the_traced_reflection(
     trace: mb.LayerTrace, matrix: mb.RenderingMatrix
 ) -> None:
-    target = matrix.average(trace.samples, 0, np.asarray(trace.samples.shells[1].radiance)[:, :3])
+    target = matrix.average(np.asarray(trace.samples.shells[1].radiance)[:, :3])
     weights = mb.display_row_weights(matrix, SAMPLES, target)
-    assert weights.shape == (matrix.rows,)
-    texels, report = mb.MapSolver(matrix, weights, LAYOUT).solve(target)
+    assert weights.shape == (matrix.rows, 3)
+    texels, report = solver_of(matrix).solve([target], [weights])
+    assert report.converged
     assert texels.shape == (LAYOUT.texels, 3)
     assert report.iterations > 0
     assert report.rounds >= 1
@@ -118,7 +123,7 @@ def test_inferred_map_reproduces_the_traced_reflection(
     # A constant is the best that a map of one texel could do; the walls differ by far more than the residue.
     constant = np.sqrt(np.average((target - target.mean(axis=0)) ** 2))
     assert report.rms_error < 0.35 * constant
-    image = mb.render_reflector(trace.samples, [mb.PartMaps(PROXY, texels)], LAYOUT)
+    image = mb.render_reflector(trace.samples, [[mb.ShellMap(PROXY, LAYOUT, texels)]])
     drawn = image.reshape(-1, 4)[matrix.row_pixels, :3] * SAMPLES / matrix.row_samples[:, None]
     assert np.sqrt(np.average((drawn - target) ** 2)) < 0.35 * constant
 
@@ -128,27 +133,27 @@ def test_solver_starts_from_a_map_and_falls_back_to_a_prior(
 ) -> None:
     prior = random_map(3)
     target = matrix.multiply(prior)
-    weights = np.ones(matrix.rows, np.float32)
-    solver = mb.MapSolver(matrix, weights, LAYOUT, mb.SolveOptions(prior_weight=0.1))
-    texels, _ = solver.solve(target, prior=prior)
+    weights = np.ones((matrix.rows, 3), np.float32)
+    solver = solver_of(matrix, mb.SolveOptions(prior_weight=0.1))
+    texels, _ = solver.solve([target], [weights], prior=prior)
     np.testing.assert_allclose(texels, prior, atol=1e-5)
-    _, cold = solver.solve(target)
-    best, _ = solver.solve(target)
-    _, warm = solver.solve(target, initial=best)
+    _, cold = solver.solve([target], [weights])
+    best, _ = solver.solve([target], [weights])
+    _, warm = solver.solve([target], [weights], initial=best)
     assert warm.iterations < cold.iterations
 
 
 def test_solver_names_what_is_wrong(matrix: mb.RenderingMatrix) -> None:
-    weights = np.ones(matrix.rows, np.float32)
     target = np.ones((matrix.rows, 1), np.float32)
-    solver = mb.MapSolver(matrix, weights, LAYOUT)
+    weights = target.copy()
+    solver = solver_of(matrix)
     target[3] = np.nan
-    with pytest.raises(mb.InvalidArgument, match="target is not finite in 1 values"):
-        solver.solve(target)
+    with pytest.raises(mb.InvalidArgument, match="target is not finite or too large in 1 values"):
+        solver.solve([target], [weights])
     with pytest.raises(mb.InvalidArgument, match="smoothness"):
-        mb.MapSolver(matrix, weights, LAYOUT, mb.SolveOptions(smoothness=-1.0))
+        solver_of(matrix, mb.SolveOptions(smoothness=-1.0))
     with pytest.raises(mb.InvalidArgument, match="tolerance"):
-        mb.MapSolver(matrix, weights, LAYOUT, mb.SolveOptions(tolerance=0.0))
+        solver_of(matrix, mb.SolveOptions(tolerance=0.0))
 
 
 def test_diffuse_radiance_is_albedo_times_irradiance_over_pi(trace: mb.LayerTrace) -> None:

@@ -1,20 +1,22 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <span>
 
-#include "mirrorbake/envmap/cube_pyramid.hpp"
+#include "mirrorbake/envmap/texel_topology.hpp"
 #include "texel_vector.hpp"
 
 namespace mirrorbake {
 
-/// What unknown texels tend to, far from known ones: the mean of the known ones, or zero.
-enum class FillTowards { neighbours, zero };
+/// Where the texels that nothing is known about go.
+enum class FillTowards {
+  neighbours,  ///< smoothly between the known ones
+  zero,        ///< away from the known ones towards zero: for differences from a prior
+};
 
-/// Fills the texels with `known[i] == 0` smoothly from the others, across all levels: first every coarse texel from
-/// its known children (pull), then every fine one from the coarse level, bilinearly (push), then a few relaxations
-/// to the mean of the neighbours. The layout's size is a power of two.
-void fill_unknown(const CubePyramidLayout& layout, const std::vector<std::uint8_t>& known,
-                  FillTowards towards, std::vector<Channels>& texels);
+/// Sets the texels of a map that are not `known` from those that are: pull up the pyramid, push down bilinearly from the
+/// coarser level, smooth what was pushed (after Gortler et al., The Lumigraph, SIGGRAPH 1996, §3.4).
+void fill_unknown(const TexelTopology& topology, std::span<const std::uint8_t> known, FillTowards towards,
+                  std::span<Channels> texels);
 
 }  // namespace mirrorbake

@@ -2,29 +2,31 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "mirrorbake/envmap/cube_pyramid.hpp"
+#include "mirrorbake/envmap/texel_topology.hpp"
 #include "texel_vector.hpp"
 
 namespace mirrorbake {
 
 /// The quadratic form λ_s Σ (x_i − x_j)² + λ_a Σ ω_q (x_q − mean of its children)² over numbered texels: i and j neighbours
-/// on one level, q a texel with children, ω_q the fraction of its four children that are numbered. Terms that would involve texels without a number are left out.
+/// on one level, q a texel with children, ω_q a quarter of its numbered children. Terms that would involve texels without
+/// a number are left out.
 class Regulariser {
  public:
   struct Weights {
     float smoothness, level_agreement;
   };
-  static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  /// `texels`: the numbered texels in the order of their numbers; `number_of`: the reverse, kNone for the others.
-  Regulariser(const CubePyramidLayout& layout, const std::vector<std::uint32_t>& texels,
-              const std::vector<std::uint32_t>& number_of, Weights weights);
+  /// `number_of`: the number of every texel of all maps, in their order, that of all nodes one after the other; kNoTexel
+  /// for those without.
+  Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
+              std::size_t numbers, Weights weights);
 
-  /// y = (G + magnitude · 1) x, where the form is xᵀ G x. Returns xᵀ y per channel. `scratch` is memory to work in.
-  ChannelSums apply(const std::vector<Channels>& x, float magnitude, std::vector<Channels>& scratch,
-                    std::vector<Channels>& y) const;
+  /// y = (G + magnitude · 1) x, where the form is xᵀ G x. `scratch` is memory to work in.
+  void apply(const std::vector<Channels>& x, float magnitude, std::vector<Channels>& scratch,
+             std::vector<Channels>& y) const;
 
   /// Diagonal entry of G.
   float diagonal(std::size_t number) const { return diagonal_[number]; }

@@ -4,52 +4,73 @@
 #include <numbers>
 #include <string>
 
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/surface/lookup.hpp"
+#include "mirrorbake/surface/shells.hpp"
 
 namespace mirrorbake {
 namespace {
 
 constexpr std::size_t kPixelsPerChunk = 1024;
 
-glm::vec4 read_local(std::span<const float> map, const CubeFootprint& footprint) {
-  glm::vec4 value(0.0F);
-  for (int t = 0; t < footprint.count; ++t) {
-    const TexelWeight& entry = footprint.texels[static_cast<std::size_t>(t)];
-    const float* texel = map.data() + std::size_t{4} * entry.texel;
-    value += entry.weight * glm::vec4(texel[0], texel[1], texel[2], texel[3]);
+std::size_t channels_of(const ShellMap& map) { return map.texels.size() / map.topology.texels(); }
+
+glm::vec4 read(const ShellMap& map, const TexelReads& reads) {
+  const std::size_t channels = channels_of(map);
+  glm::vec4 value(0.0F, 0.0F, 0.0F, channels == 4 ? 0.0F : 1.0F);
+  for (const TexelWeight& entry : reads) {
+    const float* texel = map.texels.data() + channels * entry.texel;
+    for (std::size_t k = 0; k < channels; ++k) {
+      value[static_cast<int>(k)] += entry.weight * texel[k];
+    }
   }
   return value;
 }
 
-glm::vec3 read_distant(std::span<const float> map, const CubeFootprint& footprint) {
-  glm::vec3 value(0.0F);
-  for (int t = 0; t < footprint.count; ++t) {
-    const TexelWeight& entry = footprint.texels[static_cast<std::size_t>(t)];
-    const float* texel = map.data() + std::size_t{3} * entry.texel;
-    value += entry.weight * glm::vec3(texel[0], texel[1], texel[2]);
+void check_part(const std::string& name, const PartShells& shells, const SurfaceSamples& samples) {
+  if (shells.empty()) throw InvalidArgument(name, "no shells", "at least one");
+  for (std::size_t k = 0; k < shells.size(); ++k) {
+    const std::string shell = name + "[" + std::to_string(k) + "]";
+    const std::size_t texels = shells[k].topology.texels();
+    if (shells[k].texels.size() != 3 * texels && shells[k].texels.size() != 4 * texels) {
+      throw InvalidArgument(shell + ".texels", std::to_string(shells[k].texels.size()) + " numbers",
+                            "3 or 4 for each of " + std::to_string(texels) + " texels");
+    }
+    validate(shells[k].proxy);
+    const std::size_t known = shells[k].triangles.size();
+    if (known == 0) continue;
+    check_length("samples.triangle", samples.triangle.size(), samples.size());
+    const auto unknown = std::find_if(samples.triangle.begin(), samples.triangle.end(),
+                                      [known](std::uint32_t triangle) { return triangle >= known; });
+    if (unknown != samples.triangle.end()) {
+      throw InvalidArgument(
+          shell + ".triangles", std::to_string(known) + " entries",
+          "one per triangle of the reflector, of which number " + std::to_string(*unknown) + " is seen");
+    }
   }
-  return value;
 }
 
-void check_length(const std::string& name, std::size_t length, std::size_t expected) {
-  if (length != expected)
-    throw InvalidArgument(name, std::to_string(length) + " entries", std::to_string(expected));
+glm::vec3 incident_light(const SurfaceSamples& samples, std::size_t i, const PartShells& shells,
+                         const RunTimeModel& model) {
+  ShellComposite composite;
+  for (const ShellMap& map : shells) {
+    if (!map.triangles.empty() && map.triangles[samples.triangle[i]] == 0) continue;
+    composite.add(read(map, lookup(samples, i, map.proxy, map.topology, model)));
+    if (composite.transmittance() == 0.0F) break;
+  }
+  return composite.light();
 }
 
 }  // namespace
 
-Image render_reflector(const SurfaceSamples& samples, std::span<const PartMaps> parts,
-                       const CubePyramidLayout& layout, std::span<const glm::vec3> diffuse,
-                       const LookupOptions& options) {
+Image render_reflector(const SurfaceSamples& samples, std::span<const PartShells> parts,
+                       std::span<const glm::vec3> diffuse, const RunTimeModel& model) {
+  check_lookup_arrays(samples);
+  validate(model);
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    const std::string name = "parts[" + std::to_string(p) + "]";
-    if (!parts[p].local.empty()) {
-      check_length(name + ".local", parts[p].local.size(), 4 * layout.texels());
-      validate(parts[p].local_proxy);
-    }
-    check_length(name + ".distant", parts[p].distant.size(), 3 * layout.texels());
-    validate(parts[p].distant_proxy);
+    check_part("parts[" + std::to_string(p) + "]", parts[p], samples);
   }
   if (!samples.part.empty()) {
     const int last = *std::max_element(samples.part.begin(), samples.part.end());
@@ -58,39 +79,18 @@ Image render_reflector(const SurfaceSamples& samples, std::span<const PartMaps> 
                             "at least " + std::to_string(last + 1) + ", one per part that is seen");
     }
   }
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    const std::size_t known = parts[p].local_triangles.size();
-    if (known == 0) continue;
-    check_length("samples.triangle", samples.triangle.size(), samples.size());
-    const auto unknown = std::find_if(samples.triangle.begin(), samples.triangle.end(),
-                                      [known](std::uint32_t triangle) { return triangle >= known; });
-    if (unknown != samples.triangle.end()) {
-      throw InvalidArgument(
-          "parts[" + std::to_string(p) + "].local_triangles", std::to_string(known) + " entries",
-          "one per triangle of the reflector, of which number " + std::to_string(*unknown) + " is seen");
-    }
-  }
   if (!diffuse.empty()) check_length("diffuse", diffuse.size(), samples.size());
 
-  // Where each pixel's samples start: pixels are independent of each other, samples are in their order.
   Image image(samples.width, samples.height, {"R", "G", "B", "A"});
   const std::size_t pixels =
       static_cast<std::size_t>(samples.width) * static_cast<std::size_t>(samples.height);
   parallel_for(pixels, kPixelsPerChunk, [&](std::size_t begin, std::size_t end) {
+    // Where each pixel's samples start: pixels are independent of each other, samples are in their order.
     const auto first = std::lower_bound(samples.pixel.begin(), samples.pixel.end(), begin);
     const float mean = 1.0F / static_cast<float>(samples.samples_per_pixel);
     for (std::size_t i = static_cast<std::size_t>(first - samples.pixel.begin());
          i < samples.size() && samples.pixel[i] < end; ++i) {
-      const PartMaps& maps = parts[samples.part[i]];
-      glm::vec3 light =
-          read_distant(maps.distant, lookup_footprint(samples, i, maps.distant_proxy, layout, options));
-      if (!maps.local.empty() &&
-          (maps.local_triangles.empty() || maps.local_triangles[samples.triangle[i]] != 0)) {
-        const glm::vec4 local =
-            read_local(maps.local, lookup_footprint(samples, i, maps.local_proxy, layout, options));
-        light = glm::vec3(local) + (1.0F - local.a) * light;
-      }
-      light *= samples.fresnel[i];
+      glm::vec3 light = samples.fresnel[i] * incident_light(samples, i, parts[samples.part[i]], model);
       if (!diffuse.empty()) light += diffuse[i];
       float* pixel = image.pixels.data() + std::size_t{4} * samples.pixel[i];
       for (int k = 0; k < 3; ++k) pixel[k] += mean * light[k];

@@ -14,6 +14,7 @@ from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
 from mirrorbake.errors import OptionError, StoreError
 from mirrorbake.pem.header import Header, Source
+from mirrorbake.pem.run_time import lookups_of
 from mirrorbake.pem.store import GROUP_NAME, PemStore, Timings, exclusive
 from mirrorbake.pem.view_images import images_of_trace
 from mirrorbake.proxy import hull_triangles, proxy_from_attributes, proxy_to_attributes
@@ -194,7 +195,7 @@ class _ViewBaker:
         self._capture = capture
         self._local_triangles = store.read_local_triangles()
         self._layout = _core.CubePyramidLayout(store.header.map_size)
-        self._lookup = _core.LookupOptions(footprint_scale=config.infer.footprint_scale)
+        self._lookup = lookups_of(config.infer.footprint_scale)
         self._solve = _core.SolveOptions(
             smoothness=config.infer.smoothness,
             level_agreement=config.infer.level_agreement,
@@ -223,7 +224,7 @@ class _ViewBaker:
                     triangles,
                 )
                 values = self._values(trace.samples, layer, "local" in part["layers"])
-                target = matrix.average(trace.samples, number, values, triangles)
+                target = matrix.average(values)
                 middle = time.perf_counter()
                 maps[part["name"], layer] = self._infer(matrix, target, layer)
                 build_s += middle - start
@@ -244,7 +245,7 @@ class _ViewBaker:
             channels = target.shape[1]
             return np.zeros((self._layout.texels, channels), np.float32) if initial is None else initial
         weights = _core.display_row_weights(matrix, self._stage.options.samples_per_pixel, target)
-        solver = _core.MapSolver(matrix, weights, self._layout, self._solve)
+        solver = _core.MapSolver([(matrix, [(0, 1.0)])], [self._layout], options=self._solve)
         captured = layer == "distant" and self._config.infer.prior == "captured"
-        texels, _ = solver.solve(target, self._capture if captured else None, initial)
+        texels, _ = solver.solve([target], [weights], self._capture if captured else None, initial)
         return np.asarray(texels)

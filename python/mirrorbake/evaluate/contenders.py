@@ -9,7 +9,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.evaluate.references import options_of
-from mirrorbake.pem.run_time import blended
+from mirrorbake.pem.run_time import blended, lookups_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -112,7 +112,7 @@ class SingleLayer:
         self._layout = _core.CubePyramidLayout(header.map_size)
         self._proxy = _core.Proxy.infinite(header.static["infinite"]["origin"])
         infer = pem.stage.config.infer
-        self._lookup = _core.LookupOptions(footprint_scale=infer.footprint_scale)
+        self._lookup = lookups_of(infer.footprint_scale)
         self._solve = _core.SolveOptions(
             smoothness=infer.smoothness,
             level_agreement=infer.level_agreement,
@@ -131,7 +131,7 @@ class SingleLayer:
             blended([(self._maps[i][part], weight) for i, weight in shares])
             for part in range(len(self._pem.store.header.parts))
         ]
-        parts = [_core.PartMaps(self._proxy, texels) for texels in maps]
+        parts = [[_core.ShellMap(self._proxy, self._layout, texels)] for texels in maps]
         return self._pem.run_time.render_parts(parts, frame.samples(run_time))
 
     def _infer(self, index: int) -> list[FloatArray]:
@@ -149,8 +149,8 @@ class SingleLayer:
             if matrix.rows == 0:
                 maps.append(np.asarray(self._capture))
                 continue
-            target = matrix.average(samples, part, incident)
+            target = matrix.average(incident)
             weights = _core.display_row_weights(matrix, stage.options.samples_per_pixel, target)
-            solver = _core.MapSolver(matrix, weights, self._layout, self._solve)
-            maps.append(np.asarray(solver.solve(target, self._capture, self._capture)[0]))
+            solver = _core.MapSolver([(matrix, [(0, 1.0)])], [self._layout], options=self._solve)
+            maps.append(np.asarray(solver.solve([target], [weights], self._capture, self._capture)[0]))
         return maps

@@ -32,6 +32,16 @@ def blended(shares: Sequence[tuple[FloatArray, float]]) -> FloatArray:
     return total
 
 
+def lookups_of(footprint_scale: float) -> _core.RunTimeModel:
+    """Return the run time that PEMs are inferred for and drawn by: one isotropic lookup per traced sample."""
+    return _core.RunTimeModel(
+        name="traced samples",
+        places=_core.run_time_model("Reference").places,
+        footprint_scale=footprint_scale,
+        filter="trilinear",
+    )
+
+
 @dataclass
 class RunTime:
     """A PEM opened for drawing.
@@ -46,9 +56,7 @@ class RunTime:
     def __post_init__(self) -> None:
         self._header: Header = self.store.header
         self._layout = _core.CubePyramidLayout(self._header.map_size)
-        self._options = _core.LookupOptions(
-            footprint_scale=self._header.source.config["infer"]["footprint_scale"]
-        )
+        self._options = lookups_of(self._header.source.config["infer"]["footprint_scale"])
         self._irradiance = self.store.read_irradiance()
         self._local_triangles = self.store.read_local_triangles()
         self._static = _core.build_cube_pyramid(self.store.read_capture())
@@ -82,16 +90,16 @@ class RunTime:
             parts = self._static_parts("infinite" if contender == "static_infinite" else "proxy")
         return self.render_parts(parts, samples)
 
-    def render_parts(self, parts: list[_core.PartMaps], samples: _core.SurfaceSamples) -> FloatArray:
+    def render_parts(self, parts: list[list[_core.ShellMap]], samples: _core.SurfaceSamples) -> FloatArray:
         """Draw the reflector from maps of each part, with the PEM's diffuse layer; returns as `render`."""
         diffuse = None
         if self._irradiance is not None:
             diffuse = _core.diffuse_from_irradiance(samples, self.triangles, self._irradiance)
-        image = _core.render_reflector(samples, parts, self._layout, diffuse, self._options)
+        image = _core.render_reflector(samples, parts, diffuse, self._options)
         coverage = image[..., 3:]
         return np.divide(image[..., :3], coverage, out=np.zeros_like(image[..., :3]), where=coverage > 0.0)
 
-    def _pem_parts(self, blend: list[tuple[int, float]]) -> list[_core.PartMaps]:
+    def _pem_parts(self, blend: list[tuple[int, float]]) -> list[list[_core.ShellMap]]:
         self._views = {i: self._views.get(i) or self._read_view(i) for i, _ in blend}
         parts = []
         for part in self._header.parts:
@@ -99,18 +107,16 @@ class RunTime:
             for layer in part["layers"]:
                 maps[layer] = blended([(self._views[i][part["name"], layer], share) for i, share in blend])
             distant = proxy_from_attributes(part["layers"]["distant"])
+            shells = [_core.ShellMap(distant, self._layout, maps["distant"])]
             if "local" in maps:
                 local = proxy_from_attributes(part["layers"]["local"])
-                parts.append(
-                    _core.PartMaps(distant, maps["distant"], local, maps["local"], self._local_triangles)
-                )
-            else:
-                parts.append(_core.PartMaps(distant, maps["distant"]))
+                shells.insert(0, _core.ShellMap(local, self._layout, maps["local"], self._local_triangles))
+            parts.append(shells)
         return parts
 
     def _read_view(self, index: int) -> dict[tuple[str, str], FloatArray]:
         return {name: self.store.read_map(*name, index) for name in self._header.map_names()}
 
-    def _static_parts(self, shape: str) -> list[_core.PartMaps]:
+    def _static_parts(self, shape: str) -> list[list[_core.ShellMap]]:
         proxy = proxy_from_attributes(self._header.static[shape])
-        return [_core.PartMaps(proxy, self._static) for _ in self._header.parts]
+        return [[_core.ShellMap(proxy, self._layout, self._static)] for _ in self._header.parts]

@@ -16,17 +16,45 @@ namespace {
 
 const Proxy kInfinity{InfiniteSphere{}, {0.0F, 0.0F, 0.0F}};
 
+const RunTimeModel kIsotropic = [] {
+  RunTimeModel model = reference_run_time();
+  model.filter = LookupFilter::trilinear;
+  return model;
+}();
+
 struct Problem {
   CubePyramidLayout layout;
   RenderingMatrix matrix;
   std::vector<float> row_weights;
 };
 
+// A solver for the one map of one view.
+MapSolver make_solver(const RenderingMatrix& matrix, const TexelTopology& topology,
+                      const SolveOptions& options = {}) {
+  const SolverView view{&matrix};
+  return MapSolver({&view, 1}, {&topology, 1}, 1, options);
+}
+
+// Every channel with the same row weights.
+MapSolution solve(const MapSolver& solver, std::span<const float> row_weights, std::span<const float> target,
+                  int channels, std::span<const float> prior = {}) {
+  std::vector<float> weights;
+  for (float w : row_weights) weights.insert(weights.end(), static_cast<std::size_t>(channels), w);
+  const ViewTarget view{target, weights};
+  return solver.solve({.channels = channels, .views = {&view, 1}, .prior = prior});
+}
+
+MapSolution solve(const Problem& problem, const SolveOptions& options, std::span<const float> target,
+                  int channels, std::span<const float> prior = {}) {
+  return solve(make_solver(problem.matrix, problem.layout, options), problem.row_weights, target, channels,
+               prior);
+}
+
 Problem make_problem(int image, int samples_per_pixel, int size) {
   Problem problem;
   const SurfaceSamples samples = testing::mirror_sphere_samples(image, samples_per_pixel);
   problem.layout = CubePyramidLayout::full(size);
-  problem.matrix = build_rendering_matrix(samples, 0, kInfinity, problem.layout);
+  problem.matrix = build_rendering_matrix(samples, 0, kInfinity, problem.layout, kIsotropic);
   problem.row_weights = testing::random_values(problem.matrix.rows(), 3);
   return problem;
 }
@@ -44,7 +72,10 @@ Eigen::MatrixXd dense(const RenderingMatrix& matrix) {
 
 // Rows of the regulariser written down from its definition, one per term.
 Eigen::MatrixXd dense_regulariser(const CubePyramidLayout& layout, const std::set<std::uint32_t>& seen,
-                                  const SolveOptions& options, double prior_weight) {
+                                  const SolveOptions& options, double scale, double prior_weight) {
+  const double smoothness = scale * static_cast<double>(options.smoothness);
+  const double agreement = scale * static_cast<double>(options.level_agreement);
+  const TexelTopology topology = layout;
   std::vector<Eigen::VectorXd> rows;
   const auto n = static_cast<Eigen::Index>(layout.texels());
   for (int level = 0; level < layout.levels; ++level) {
@@ -56,11 +87,11 @@ Eigen::MatrixXd dense_regulariser(const CubePyramidLayout& layout, const std::se
           if (!seen.contains(i)) continue;
           // Each edge is met from both of its ends, so each visit carries half of its square.
           for (const auto& [dr, dc] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-            const std::uint32_t j = cube_texel_across_edges(layout, level, face, row + dr, column + dc);
+            const std::uint32_t j = topology.texel_at({level, face, row + dr, column + dc});
             if (!seen.contains(j)) continue;
             Eigen::VectorXd v = Eigen::VectorXd::Zero(n);
-            v(i) += std::sqrt(0.5 * static_cast<double>(options.smoothness));
-            v(j) -= std::sqrt(0.5 * static_cast<double>(options.smoothness));
+            v(i) += std::sqrt(0.5 * smoothness);
+            v(j) -= std::sqrt(0.5 * smoothness);
             rows.push_back(v);
           }
           std::vector<std::uint32_t> children;
@@ -71,14 +102,14 @@ Eigen::MatrixXd dense_regulariser(const CubePyramidLayout& layout, const std::se
           }
           if (!children.empty()) {
             const double count = static_cast<double>(children.size());
-            const double w = std::sqrt(static_cast<double>(options.level_agreement) * count / 4.0);
+            const double w = std::sqrt(agreement * count / 4.0);
             Eigen::VectorXd v = Eigen::VectorXd::Zero(n);
             v(i) = w;
             for (std::uint32_t c : children) v(c) = -w / count;
             rows.push_back(v);
           }
           Eigen::VectorXd v = Eigen::VectorXd::Zero(n);
-          v(i) = std::sqrt(prior_weight);
+          v(i) = std::sqrt(scale * prior_weight);
           rows.push_back(v);
         }
       }
@@ -105,7 +136,6 @@ TEST(MapSolver, AgreesWithADenseSolve) {
   options.prior_weight = 0.03F;
   options.tolerance = 1e-7F;
   options.max_iterations = 2000;
-  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, options);
   const std::vector<float> target = random_around(5.0F, 3 * problem.matrix.rows(), 7);
   const std::vector<float> prior = random_around(5.0F, 3 * problem.layout.texels(), 8);
 
@@ -115,13 +145,17 @@ TEST(MapSolver, AgreesWithADenseSolve) {
   const Eigen::VectorXd w =
       Eigen::Map<const Eigen::VectorXf>(problem.row_weights.data(), a.rows()).cast<double>();
   for (const bool with_prior : {false, true}) {
-    const Eigen::MatrixXd g = dense_regulariser(problem.layout, seen, options, with_prior ? 0.03F : 0.0);
+    const MapSolution solution = solve(problem, options, target, 3,
+                                       with_prior ? std::span<const float>(prior) : std::span<const float>{});
+    const Eigen::VectorXd row_sums = a.rowwise().sum();
+    const double scale = (w.array() * row_sums.array().square()).sum() / static_cast<double>(seen.size());
+    EXPECT_NEAR(solution.report.row_scale[0], scale, 1e-5 * scale);
+    const Eigen::MatrixXd g =
+        dense_regulariser(problem.layout, seen, options, scale, with_prior ? 0.03F : 0.0);
     Eigen::MatrixXd normal = a.transpose() * w.asDiagonal() * a + g.transpose() * g;
     for (Eigen::Index i = 0; i < normal.rows(); ++i) {
       if (!seen.contains(static_cast<std::uint32_t>(i))) normal(i, i) = 1.0;
     }
-    const MapSolution solution =
-        solver.solve(target, 3, with_prior ? std::span<const float>(prior) : std::span<const float>{});
     EXPECT_EQ(solution.report.unknowns, seen.size());
     for (int k = 0; k < 3; ++k) {
       Eigen::VectorXd b(a.rows());
@@ -152,12 +186,12 @@ TEST(MapSolver, IsTheBestMapWithinTheBounds) {
   options.tolerance = 1e-6F;
   options.max_iterations = 20000;
   const std::vector<float> target = random_around(0.1F, problem.matrix.rows(), 7);
-  const MapSolution solution =
-      MapSolver(problem.matrix, problem.row_weights, problem.layout, options).solve(target, 1);
+  const MapSolution solution = solve(problem, options, target, 1);
 
   const std::set<std::uint32_t> seen(problem.matrix.texels.begin(), problem.matrix.texels.end());
   const Eigen::MatrixXd a = dense(problem.matrix);
-  const Eigen::MatrixXd g = dense_regulariser(problem.layout, seen, options, 0.0);
+  const Eigen::MatrixXd g =
+      dense_regulariser(problem.layout, seen, options, solution.report.row_scale[0], 0.0);
   const Eigen::VectorXd w =
       Eigen::Map<const Eigen::VectorXf>(problem.row_weights.data(), a.rows()).cast<double>();
   const Eigen::VectorXd b = Eigen::Map<const Eigen::VectorXf>(target.data(), a.rows()).cast<double>();
@@ -189,8 +223,7 @@ TEST(MapSolver, ReproducesATargetThatAMapCanMake) {
   options.max_iterations = 3000;
   const std::vector<float> truth = testing::random_values(4 * problem.layout.texels(), 1);
   const std::vector<float> target = multiply(problem.matrix, truth, 4);
-  const MapSolution solution =
-      MapSolver(problem.matrix, problem.row_weights, problem.layout, options).solve(target, 4);
+  const MapSolution solution = solve(problem, options, target, 4);
   // What is left is the pull of the smoothness on a map of white noise; the noise itself is 0.29.
   EXPECT_LT(solution.report.rms_error, 5e-3);
 }
@@ -198,13 +231,13 @@ TEST(MapSolver, ReproducesATargetThatAMapCanMake) {
 // Scaling the light scales the solution: nothing in the solver has a unit. A power of two changes no rounding.
 TEST(MapSolver, IsLinearOverTenOrdersOfRadiance) {
   const Problem problem = make_problem(32, 4, 16);
-  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
+  const MapSolver solver = make_solver(problem.matrix, problem.layout);
   const std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);
-  const MapSolution unit = solver.solve(target, 1);
+  const MapSolution unit = solve(solver, problem.row_weights, target, 1);
   for (float scale : {0x1p-14F, 0x1p20F}) {
     std::vector<float> scaled = target;
     for (float& value : scaled) value *= scale;
-    const MapSolution solution = solver.solve(scaled, 1);
+    const MapSolution solution = solve(solver, problem.row_weights, scaled, 1);
     for (std::size_t i = 0; i < solution.texels.size(); ++i)
       ASSERT_EQ(solution.texels[i], scale * unit.texels[i]);
   }
@@ -214,20 +247,16 @@ TEST(MapSolver, SolvesATargetThatSpansTenOrdersOfRadiance) {
   const Problem problem = make_problem(32, 4, 16);
   std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);
   for (float& value : target) value = std::pow(10.0F, 10.0F * value - 4.0F);
-  const MapSolution solution =
-      MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 1);
+  const MapSolution solution = solve(problem, {}, target, 1);
   for (float value : solution.texels) ASSERT_TRUE(std::isfinite(value) && value >= 0.0F);
 }
 
 TEST(MapSolver, SameBitsOnOneThread) {
   const Problem problem = make_problem(96, 4, 64);
   const std::vector<float> target = testing::random_values(3 * problem.matrix.rows(), 5);
-  const auto solve = [&] {
-    return MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 3);
-  };
-  const MapSolution all = solve();
+  const MapSolution all = solve(problem, {}, target, 3);
   const ThreadLimit limit(1);
-  const MapSolution one = solve();
+  const MapSolution one = solve(problem, {}, target, 3);
   EXPECT_EQ(all.texels, one.texels);
   EXPECT_EQ(all.report.iterations, one.report.iterations);
 }
@@ -235,21 +264,21 @@ TEST(MapSolver, SameBitsOnOneThread) {
 TEST(MapSolver, FillsUnseenTexelsBetweenTheSeenOnes) {
   const Problem problem = make_problem(24, 4, 16);
   const std::vector<float> target(problem.matrix.rows(), 0.7F);
-  const MapSolution solution =
-      MapSolver(problem.matrix, problem.row_weights, problem.layout, {}).solve(target, 1);
+  const MapSolution solution = solve(problem, {}, target, 1);
   for (float value : solution.texels) ASSERT_NEAR(value, 0.7F, 1e-5F);
 }
 
 TEST(MapSolver, FallsBackToThePriorWhereNothingIsSeen) {
   const Problem problem = make_problem(24, 4, 16);
   const std::vector<float> prior = testing::random_values(problem.layout.texels(), 11);
-  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
+  const MapSolver solver = make_solver(problem.matrix, problem.layout);
   // A target that the prior explains leaves it as it is, seen or not.
-  const MapSolution same = solver.solve(multiply(problem.matrix, prior, 1), 1, prior);
+  const MapSolution same = solve(solver, problem.row_weights, multiply(problem.matrix, prior, 1), 1, prior);
   for (std::size_t i = 0; i < prior.size(); ++i) ASSERT_NEAR(same.texels[i], prior[i], 1e-5F);
   // Straight up is seen by this part, the upper half of the sphere; straight down is a quarter circle away from all
   // that it sees. The one follows the target, the other stays near the prior.
-  const MapSolution other = solver.solve(std::vector<float>(problem.matrix.rows(), 5.0F), 1, prior);
+  const MapSolution other =
+      solve(solver, problem.row_weights, std::vector<float>(problem.matrix.rows(), 5.0F), 1, prior);
   const std::size_t up = problem.layout.index(0, 2, 8, 8);
   const std::size_t down = problem.layout.index(0, 3, 8, 8);
   EXPECT_LT(std::abs(other.texels[up] - 5.0F), 0.3F * (5.0F - prior[up]));
@@ -260,9 +289,9 @@ TEST(MapSolver, ClampsToRadianceAndCoverage) {
   const Problem problem = make_problem(24, 4, 16);
   const std::vector<float> high(4 * problem.matrix.rows(), 3.0F);
   const std::vector<float> low(4 * problem.matrix.rows(), -3.0F);
-  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
-  const MapSolution above = solver.solve(high, 4);
-  const MapSolution below = solver.solve(low, 4);
+  const MapSolver solver = make_solver(problem.matrix, problem.layout);
+  const MapSolution above = solve(solver, problem.row_weights, high, 4);
+  const MapSolution below = solve(solver, problem.row_weights, low, 4);
   for (std::size_t i = 0; i < above.texels.size(); ++i) {
     ASSERT_NEAR(above.texels[i], i % 4 == 3 ? 1.0F : 3.0F, 1e-4F);
     ASSERT_EQ(below.texels[i], 0.0F);
@@ -273,7 +302,7 @@ TEST(MapSolver, AnswersWithoutRowsWithoutWeightsAndWithoutARegulariser) {
   RenderingMatrix nothing;
   nothing.columns = CubePyramidLayout::full(4).texels();
   nothing.row_offsets = {0};
-  const MapSolution empty = MapSolver(nothing, {}, CubePyramidLayout::full(4), {}).solve({}, 3);
+  const MapSolution empty = solve(make_solver(nothing, CubePyramidLayout::full(4)), {}, {}, 3);
   EXPECT_EQ(empty.texels, std::vector<float>(3 * nothing.columns, 0.0F));
   EXPECT_EQ(empty.report.unknowns, 0u);
 
@@ -281,12 +310,12 @@ TEST(MapSolver, AnswersWithoutRowsWithoutWeightsAndWithoutARegulariser) {
   free.smoothness = free.level_agreement = free.prior_weight = 0.0F;
   const Problem problem = make_problem(16, 1, 16);
   const std::vector<float> target = testing::random_values(problem.matrix.rows(), 4);
-  for (float value :
-       MapSolver(problem.matrix, problem.row_weights, problem.layout, free).solve(target, 1).texels) {
+  for (float value : solve(problem, free, target, 1).texels) {
     ASSERT_TRUE(std::isfinite(value));
   }
   const std::vector<float> zero_weights(problem.matrix.rows());
-  for (float value : MapSolver(problem.matrix, zero_weights, problem.layout, free).solve(target, 1).texels) {
+  for (float value :
+       solve(make_solver(problem.matrix, problem.layout, free), zero_weights, target, 1).texels) {
     ASSERT_EQ(value, 0.0F);
   }
 }
@@ -296,40 +325,89 @@ TEST(MapSolver, SolvesASinglePixelAndMapsOfOneTexel) {
   ASSERT_EQ(samples.size(), 1u);
   for (int size : {1, 2, 64}) {
     const CubePyramidLayout layout = CubePyramidLayout::full(size);
-    const RenderingMatrix a = build_rendering_matrix(samples, samples.part[0], kInfinity, layout);
+    const RenderingMatrix a = build_rendering_matrix(samples, samples.part[0], kInfinity, layout, kIsotropic);
     ASSERT_EQ(a.rows(), 1u);
     SolveOptions options;
     options.smoothness = options.level_agreement = 1e-6F;
     options.tolerance = 1e-6F;
     const std::vector<float> target{2.5F};
     const std::vector<float> weight{1.0F};
-    const MapSolution solution = MapSolver(a, weight, layout, options).solve(target, 1);
+    const MapSolution solution = solve(make_solver(a, layout, options), weight, target, 1);
     EXPECT_NEAR(multiply(a, solution.texels, 1)[0], 2.5F, 1e-3F) << size;
   }
 }
 
 TEST(MapSolver, RejectsBadInputWithItsCount) {
   const Problem problem = make_problem(16, 1, 8);
-  const MapSolver solver(problem.matrix, problem.row_weights, problem.layout, {});
+  const MapSolver solver = make_solver(problem.matrix, problem.layout);
   std::vector<float> target(problem.matrix.rows(), 1.0F);
   target[0] = std::numeric_limits<float>::quiet_NaN();
   target[5] = std::numeric_limits<float>::infinity();
   try {
-    solver.solve(target, 1);
+    solve(solver, problem.row_weights, target, 1);
     FAIL() << "accepted NaN";
   } catch (const InvalidArgument& error) {
     EXPECT_NE(std::string(error.what()).find("2 values"), std::string::npos) << error.what();
   }
-  EXPECT_THROW(solver.solve({}, 1), InvalidArgument);
-  EXPECT_THROW(solver.solve(std::vector<float>(5 * problem.matrix.rows()), 5), InvalidArgument);
-  EXPECT_THROW(solver.solve(std::vector<float>(problem.matrix.rows()), 1, std::vector<float>(3)),
+  EXPECT_THROW(solve(solver, problem.row_weights, {}, 1), InvalidArgument);
+  EXPECT_THROW(solve(solver, problem.row_weights, std::vector<float>(5 * problem.matrix.rows()), 5),
                InvalidArgument);
-  EXPECT_THROW(MapSolver(problem.matrix, problem.row_weights, CubePyramidLayout::full(16), {}),
-               InvalidArgument);
-  EXPECT_THROW(MapSolver(problem.matrix, {}, problem.layout, {}), InvalidArgument);
-  SolveOptions negative;
+  EXPECT_THROW(
+      solve(solver, problem.row_weights, std::vector<float>(problem.matrix.rows()), 1, std::vector<float>(3)),
+      InvalidArgument);
+  EXPECT_THROW(solve(solver, {}, std::vector<float>(problem.matrix.rows()), 1), InvalidArgument);
+  EXPECT_THROW(make_solver(problem.matrix, CubePyramidLayout::full(16)), InvalidArgument);
+  // Finite, but its square is not.
+  target.assign(problem.matrix.rows(), 3e38F);
+  EXPECT_THROW(solve(solver, problem.row_weights, target, 1), InvalidArgument);
+  SolveOptions negative, endless;
   negative.smoothness = -1.0F;
-  EXPECT_THROW(MapSolver(problem.matrix, problem.row_weights, problem.layout, negative), InvalidArgument);
+  endless.tolerance = std::numeric_limits<float>::infinity();
+  EXPECT_THROW(make_solver(problem.matrix, problem.layout, negative), InvalidArgument);
+  EXPECT_THROW(make_solver(problem.matrix, problem.layout, endless), InvalidArgument);
+}
+
+// Views of blends: the blend of the solved nodes shows what each view wants, where one map could not. Between the nodes,
+// a view's row is spread over both.
+TEST(MapSolver, NodesAreFoundFromViewsOfTheirBlends) {
+  const Problem problem = make_problem(48, 4, 16);
+  const std::size_t texels = problem.layout.texels();
+  const std::vector<float> first = testing::random_values(texels, 21);
+  const std::vector<float> second = testing::random_values(texels, 22);
+  std::vector<SolverView> views;
+  std::vector<std::vector<float>> targets;
+  for (float t : {0.0F, 0.3F, 0.6F, 1.0F}) {
+    views.push_back({&problem.matrix, {{0, 1.0F - t}, {1, t}}});
+    std::vector<float> blend(texels);
+    for (std::size_t i = 0; i < texels; ++i) blend[i] = (1.0F - t) * first[i] + t * second[i];
+    targets.push_back(multiply(problem.matrix, blend, 1));
+  }
+  const TexelTopology topology = problem.layout;
+  const SolveOptions options{
+      .smoothness = 1e-7F, .level_agreement = 1e-7F, .tolerance = 1e-6F, .max_iterations = 3000};
+  const MapSolver solver(views, {&topology, 1}, 2, options);
+  std::vector<ViewTarget> wanted;
+  for (const auto& target : targets) wanted.push_back({target, problem.row_weights});
+  const MapSolution solution = solver.solve({.channels = 1, .views = wanted});
+  ASSERT_EQ(solution.texels.size(), 2 * texels);
+  // As for one map: what is left is the pull of the smoothness on white noise.
+  EXPECT_LT(solution.report.rms_error, 5e-3);
+  const std::vector<float> shown = multiply(problem.matrix, {solution.texels.data(), texels}, 1);
+  for (std::size_t r = 0; r < shown.size(); ++r) ASSERT_NEAR(shown[r], targets[0][r], 0.05F);
+
+  // A view of a node that does not exist.
+  const SolverView half{&problem.matrix, {{0, 0.5F}, {1, 0.5F}}};
+  EXPECT_THROW(MapSolver({&half, 1}, {&topology, 1}, 1, options), InvalidArgument);
+}
+
+TEST(MapSolver, ReportsWhetherItConverged) {
+  const Problem problem = make_problem(48, 4, 32);
+  const std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);
+  EXPECT_TRUE(solve(problem, {.max_iterations = 2000}, target, 1).report.converged);
+  const MapSolution hasty = solve(problem, {.max_iterations = 3}, target, 1);
+  EXPECT_FALSE(hasty.report.converged);
+  EXPECT_EQ(hasty.report.iterations, 3);
+  for (float value : hasty.texels) ASSERT_TRUE(std::isfinite(value) && value >= 0.0F);
 }
 
 TEST(MapSolver, RowWeightsFollowCoverageAndDisplayedBrightness) {
@@ -338,9 +416,10 @@ TEST(MapSolver, RowWeightsFollowCoverageAndDisplayedBrightness) {
   const std::vector<float> bright(3 * problem.matrix.rows(), 9.0F);
   const std::vector<float> w0 = display_row_weights(problem.matrix, 4, dark, 3);
   const std::vector<float> w9 = display_row_weights(problem.matrix, 4, bright, 3);
-  for (std::size_t r = 0; r < w0.size(); ++r) {
-    EXPECT_EQ(w0[r], static_cast<float>(problem.matrix.row_samples[r]) / 4.0F);
-    EXPECT_NEAR(w9[r], w0[r] / 100.0F, 1e-6F);
+  for (std::size_t r = 0; r < problem.matrix.rows(); ++r) {
+    EXPECT_EQ(w0[3 * r], static_cast<float>(problem.matrix.row_samples(r)) / 4.0F);
+    EXPECT_EQ(w0[3 * r], w0[3 * r + 2]);
+    EXPECT_NEAR(w9[3 * r], w0[3 * r] / 100.0F, 1e-6F);
   }
 }
 

@@ -8,6 +8,7 @@
 #include "mirror_sphere.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/inference/rendering_matrix.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -23,19 +24,19 @@ TEST(Render, AgreesWithTheRenderingMatrixForRandomMaps) {
   for (const Proxy& proxy : {kBox, kEllipsoid, Proxy{}}) {
     std::vector<float> maps[2];
     for (std::size_t p = 0; p < 2; ++p) maps[p] = testing::random_values(3 * layout.texels(), p);
-    const PartMaps parts[2] = {{{}, {}, proxy, maps[0]}, {{}, {}, proxy, maps[1]}};
-    const Image image = render_reflector(samples, parts, layout, {});
+    const PartShells parts[2] = {{{proxy, layout, maps[0]}}, {{proxy, layout, maps[1]}}};
+    const Image image = render_reflector(samples, parts, {});
     std::vector<float> expected(image.pixels.size());
     for (int part : {0, 1}) {
       const RenderingMatrix a = build_rendering_matrix(samples, part, proxy, layout);
       const std::vector<float> b = multiply(a, maps[part], 3);
       for (std::size_t r = 0; r < a.rows(); ++r) {
-        const float coverage = static_cast<float>(a.row_samples[r]) / 5.0F;
+        const float coverage = static_cast<float>(a.row_samples(r)) / 5.0F;
         for (std::size_t k = 0; k < 3; ++k) expected[4 * a.row_pixels[r] + k] += coverage * b[3 * r + k];
         expected[4 * a.row_pixels[r] + 3] += coverage;
       }
     }
-    // Sums of up to 5 × 8 products in another order.
+    // Sums of up to 5 × 32 products in another order.
     for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(image.pixels[i], expected[i], 3e-6F) << i;
   }
 }
@@ -48,15 +49,15 @@ TEST(Render, AgreesWithEveryColumnOfTheRenderingMatrix) {
   for (std::size_t texel = 0; texel < layout.texels(); ++texel) {
     std::vector<float> map(3 * layout.texels());
     map[3 * texel] = 1.0F;
-    const PartMaps part{{}, {}, kBox, map};
-    const PartMaps parts[2] = {part, part};
-    const Image image = render_reflector(samples, parts, layout, {});
+    const PartShells part{{kBox, layout, map}};
+    const PartShells parts[2] = {part, part};
+    const Image image = render_reflector(samples, parts, {});
     std::vector<float> column(144);
     for (const RenderingMatrix& a : matrices) {
       for (std::size_t r = 0; r < a.rows(); ++r) {
         for (std::uint64_t e = a.row_offsets[r]; e < a.row_offsets[r + 1]; ++e) {
           if (a.texels[e] != texel) continue;
-          column[a.row_pixels[r]] += a.weights[e] * static_cast<float>(a.row_samples[r]) / 2.0F;
+          column[a.row_pixels[r]] += a.weights[e] * static_cast<float>(a.row_samples(r)) / 2.0F;
         }
       }
     }
@@ -74,9 +75,9 @@ TEST(Render, CompositesLocalOverDistantTimesFresnelPlusDiffuse) {
     distant.insert(distant.end(), {4.0F, 2.0F, 1.0F});
   }
   const std::vector<glm::vec3> diffuse(samples.size(), glm::vec3(0.01F, 0.02F, 0.03F));
-  const PartMaps part{kEllipsoid, local, kBox, distant};
-  const PartMaps parts[2] = {part, part};
-  const Image image = render_reflector(samples, parts, layout, diffuse);
+  const PartShells part{{kEllipsoid, layout, local}, {kBox, layout, distant}};
+  const PartShells parts[2] = {part, part};
+  const Image image = render_reflector(samples, parts, diffuse);
   const float expected[3] = {(0.1F + 0.75F * 4.0F) * 0.2F + 0.01F, (0.2F + 0.75F * 2.0F) * 0.5F + 0.02F,
                              (0.3F + 0.75F * 1.0F) * 0.8F + 0.03F};
   int covered = 0;
@@ -96,12 +97,12 @@ TEST(Render, TrianglesThatTheLocalLayerLeavesOutShowTheDistantOneAlone) {
   const std::vector<float> local = testing::random_values(4 * layout.texels(), 1);
   const std::vector<float> distant = testing::random_values(3 * layout.texels(), 2);
   const std::vector<std::uint8_t> covered{0, 1};
-  const PartMaps with{kEllipsoid, local, kBox, distant};
-  const PartMaps without{{}, {}, kBox, distant};
-  const PartMaps split{kEllipsoid, local, kBox, distant, covered};
-  const auto draw = [&](const PartMaps& part) {
-    const PartMaps parts[2] = {part, part};
-    return render_reflector(samples, parts, layout, {});
+  const PartShells with{{kEllipsoid, layout, local}, {kBox, layout, distant}};
+  const PartShells without{{kBox, layout, distant}};
+  const PartShells split{{kEllipsoid, layout, local, covered}, {kBox, layout, distant}};
+  const auto draw = [&](const PartShells& part) {
+    const PartShells parts[2] = {part, part};
+    return render_reflector(samples, parts, {});
   };
   const Image all = draw(with);
   const Image none = draw(without);
@@ -115,19 +116,19 @@ TEST(Render, TrianglesThatTheLocalLayerLeavesOutShowTheDistantOneAlone) {
   }
   EXPECT_NE(all.pixels, none.pixels);
   const std::vector<std::uint8_t> too_few{1};
-  const PartMaps parts[2] = {split, {kEllipsoid, local, kBox, distant, too_few}};
-  EXPECT_THROW(render_reflector(samples, parts, layout, {}), InvalidArgument);
+  const PartShells parts[2] = {split, {{kEllipsoid, layout, local, too_few}, {kBox, layout, distant}}};
+  EXPECT_THROW(render_reflector(samples, parts, {}), InvalidArgument);
 }
 
 TEST(Render, SameBitsOnOneThread) {
   const SurfaceSamples samples = testing::mirror_sphere_samples(64, 4);
   const CubePyramidLayout layout = CubePyramidLayout::full(32);
   const std::vector<float> map = testing::random_values(3 * layout.texels(), 9);
-  const PartMaps part{{}, {}, kBox, map};
-  const PartMaps parts[2] = {part, part};
-  const Image all = render_reflector(samples, parts, layout, {});
+  const PartShells part{{kBox, layout, map}};
+  const PartShells parts[2] = {part, part};
+  const Image all = render_reflector(samples, parts, {});
   const ThreadLimit limit(1);
-  EXPECT_EQ(all.pixels, render_reflector(samples, parts, layout, {}).pixels);
+  EXPECT_EQ(all.pixels, render_reflector(samples, parts, {}).pixels);
 }
 
 TEST(Render, RejectsMapsThatDoNotFit) {
@@ -135,14 +136,14 @@ TEST(Render, RejectsMapsThatDoNotFit) {
   const CubePyramidLayout layout = CubePyramidLayout::full(4);
   const std::vector<float> map(3 * layout.texels());
   const std::vector<float> small(3 * layout.texels() - 3);
-  const PartMaps good{{}, {}, kBox, map};
-  const PartMaps bad{{}, {}, kBox, small};
-  const PartMaps with_bad[2] = {good, bad};
-  EXPECT_THROW(render_reflector(samples, with_bad, layout, {}), InvalidArgument);
-  EXPECT_THROW(render_reflector(samples, {&good, 1}, layout, {}), InvalidArgument);
-  const PartMaps parts[2] = {good, good};
+  const PartShells good{{kBox, layout, map}};
+  const PartShells bad{{kBox, layout, small}};
+  const PartShells with_bad[2] = {good, bad};
+  EXPECT_THROW(render_reflector(samples, with_bad, {}), InvalidArgument);
+  EXPECT_THROW(render_reflector(samples, {&good, 1}, {}), InvalidArgument);
+  const PartShells parts[2] = {good, good};
   const std::vector<glm::vec3> diffuse(3);
-  EXPECT_THROW(render_reflector(samples, parts, layout, diffuse), InvalidArgument);
+  EXPECT_THROW(render_reflector(samples, parts, diffuse), InvalidArgument);
 }
 
 TEST(Render, DiffuseIsAlbedoTimesInterpolatedIrradianceOverPi) {

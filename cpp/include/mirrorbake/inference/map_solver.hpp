@@ -1,68 +1,98 @@
 #pragma once
 
+#include <array>
 #include <limits>
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "mirrorbake/envmap/cube_pyramid.hpp"
+#include "mirrorbake/envmap/texel_topology.hpp"
 #include "mirrorbake/inference/rendering_matrix.hpp"
 
-/// Inference of an environment map: regularised least squares on the rendering matrix ([PEM] §4; spec I2, I3).
+/// Inference of environment maps: regularised least squares on rendering matrices ([PEM] §4; spec I2, I3, I4).
 namespace mirrorbake {
 
-/// Weights of the regulariser are relative to a row of weight 1, which is a fully covered pixel of dark radiance.
+/// The weights λ are relative to the rows: multiplied with Σ w (A 1)² over rows and divided by the number of unknowns, per
+/// channel. So they mean the same at any size of image and map, and at any brightness of the reflector.
 struct SolveOptions {
   float smoothness = 1e-3F;  ///< λ of squared differences between neighbouring texels of one level, ≥ 0
   float level_agreement = 1e-3F;  ///< λ of a texel's squared difference from the mean of its children, ≥ 0
   float prior_weight = 1e-3F;     ///< λ of the squared difference from the prior, where one is given, ≥ 0
-  float tolerance = 1e-3F;        ///< stop when the preconditioned gradient has shrunk to this fraction, > 0
-  int max_iterations = 200;       ///< 0…100000
+  float tolerance = 1e-3F;   ///< stop when the preconditioned gradient has shrunk to this fraction, in (0, 1)
+  int max_iterations = 200;  ///< of all rounds together, 0…100000
 };
 
 struct SolveReport {
   int iterations = 0;            ///< of conjugate gradients, all rounds together
   int rounds = 0;                ///< of the active set that keeps the map within its bounds
+  bool converged = false;        ///< the gradient met the tolerance, and no bound wanted to be held or freed
   double relative_gradient = 0;  ///< what `tolerance` is compared with
   std::size_t unknowns = 0;      ///< texels that some row sees; the others are filled in smoothly
   double rms_error = 0;          ///< weighted root mean square of A x − b over rows and channels
+  std::array<double, 4> row_scale{};  ///< what the weights of SolveOptions were multiplied with, per channel
+};
+
+/// Share of a node's maps in what a view sees of the maps.
+struct NodeWeight {
+  int node = 0;
+  float weight = 1.0F;
+};
+
+/// A view of maps that are blended from those of several nodes: it sees b = A Σₖ weightₖ xₖ. One node of weight 1 is the
+/// ordinary case; several views of one node are solved jointly for one map (spec I4). `matrix` has to outlive the solver.
+struct SolverView {
+  const RenderingMatrix* matrix = nullptr;
+  std::vector<NodeWeight> nodes = {{}};
+};
+
+/// What a view should show. Both are rows × channels; a weight of 0 leaves the row out.
+struct ViewTarget {
+  std::span<const float> target;
+  std::span<const float> row_weights;
+};
+
+struct SolveProblem {
+  int channels = 3;  ///< 1…4
+  std::span<const ViewTarget> views;
+  /// Empty, or nodes × texels × channels: with a prior the regulariser acts on the difference from it (spec I2b); without
+  /// an initial map, back-projection starts.
+  std::span<const float> prior = {};
+  std::span<const float> initial = {};
+  /// Of each channel; all are ≥ 0. The default is radiance in the first three and coverage in the fourth.
+  std::array<float, 4> upper_bounds = {std::numeric_limits<float>::infinity(),
+                                       std::numeric_limits<float>::infinity(),
+                                       std::numeric_limits<float>::infinity(), 1.0F};
 };
 
 struct MapSolution {
-  std::vector<float> texels;  ///< pyramid texels × channels
+  std::vector<float> texels;  ///< nodes × texels × channels
   SolveReport report;
 };
 
-/// Row weights for a target that will be looked at on a display: coverage (samples of the row over samples per pixel)
-/// over (1 + luminance)², since a display compresses what is bright, and least squares would spend the map on lights.
-std::vector<float> display_row_weights(const RenderingMatrix& matrix, int samples_per_pixel,
-                                       std::span<const float> target, int channels);
-
-/// Solves min_x Σ_r w_r |A_r x − b_r|² + regulariser for maps of one rendering matrix. The constructor does what all
-/// solves share: it numbers the texels that are seen, transposes the matrix and builds the regulariser's stencil.
+/// Solves min_x Σ_v Σ_r w_r |A_v,r Σₖ b_k xₖ − t_v,r|² + regulariser, within the bounds, for the maps xₖ of all nodes
+/// together; the maps of a node are stacked, as the matrix's columns are. The constructor does what all solves share: it
+/// numbers the texels that are seen, transposes the matrices and builds the regulariser's stencil.
 ///
 /// The unknowns are the seen texels of all levels, solved for with conjugate gradients on the least-squares problem
 /// (CGLS, preconditioned with the diagonal), all channels at once. Unseen texels are filled from seen ones across
-/// levels (pull-push); with a prior, they fall back to it with growing distance.
+/// levels (pull-push); with a prior, they fall back to it with growing distance. Same bits on any number of threads.
 class MapSolver {
  public:
-  /// Throws InvalidArgument if the layout is not the matrix's, its size is not a power of two, or an option or weight is
-  /// out of range.
-  MapSolver(const RenderingMatrix& matrix, std::span<const float> row_weights,
-            const CubePyramidLayout& layout, const SolveOptions& options);
+  /// Throws InvalidArgument if a matrix has other columns than the maps have texels, a node's number or weight or an option
+  /// is out of range.
+  MapSolver(std::span<const SolverView> views, std::span<const TexelTopology> maps, int nodes,
+            const SolveOptions& options);
   ~MapSolver();
   MapSolver(MapSolver&&) noexcept;
   MapSolver& operator=(MapSolver&&) noexcept;
 
-  /// `target`: rows × channels. `prior` and `initial`: empty, or texels × channels; with a prior the regulariser acts
-  /// on the difference from it (spec I2b); without an initial map, back-projection starts. 1 to 4 channels; the fourth is
-  /// coverage. The map is the best one with radiance ≥ 0 and coverage in [0, 1]. Throws InvalidArgument for wrong lengths and for
-  /// values that are not finite, with their count.
-  MapSolution solve(std::span<const float> target, int channels, std::span<const float> prior = {},
-                    std::span<const float> initial = {}) const;
+  /// Throws InvalidArgument for wrong lengths, for values that are not finite or beyond 1e15, with their count, and
+  /// NumericalError if conjugate gradients leave the numbers.
+  MapSolution solve(const SolveProblem& problem) const;
+
+  struct State;  ///< of the implementation
 
  private:
-  struct State;
   std::unique_ptr<State> state_;
 };
 

@@ -6,26 +6,11 @@
 
 #include <glm/vec2.hpp>
 
+#include "mirrorbake/envmap/reads.hpp"
+
 /// How the renderer that will draw the maps reads them. A map is inferred for one run time: drawn by another it can be
 /// worse than a map that was merely captured.
 namespace mirrorbake {
-
-/// What a lookup reads of the map. `nearest` and `bilinear` read the finest level; `trilinear` the two levels next
-/// to its level of detail; `anisotropic` several trilinear taps along the longer differential (ReadFilter).
-enum class LookupFilter { nearest, bilinear, trilinear, anisotropic };
-
-/// Whether every pixel computes its texture coordinates, or every vertex does and pixels interpolate ([PEM] §4; spec G6).
-enum class CoordinateSource { per_pixel, per_vertex };
-
-/// Where a pixel's Fresnel reflectance comes from (spec F6).
-enum class FresnelSource { exact, table, schlick };
-
-LookupFilter parse_lookup_filter(std::string_view name);
-std::string_view name_of(LookupFilter filter);
-CoordinateSource parse_coordinate_source(std::string_view name);
-std::string_view name_of(CoordinateSource source);
-FresnelSource parse_fresnel_source(std::string_view name);
-std::string_view name_of(FresnelSource source);
 
 struct RunTimeModel {
   std::string name;
@@ -34,10 +19,7 @@ struct RunTimeModel {
   /// Size of a lookup's footprint in pixels: differentials are multiplied by it. About 1/√(lookups per pixel), in (0, 1024].
   float footprint_scale = 1.0F;
   LookupFilter filter = LookupFilter::anisotropic;
-  int max_taps = 4;  ///< of `anisotropic`, 1…16
-  CoordinateSource coordinates = CoordinateSource::per_pixel;
-  FresnelSource fresnel = FresnelSource::exact;
-  int texel_bits = 16;  ///< of a channel in the texture format: 32, 16 (half), 9 (shared exponent, RGB9E5)
+  int max_taps = 4;  ///< of `anisotropic`: 1, or an even number up to 16
 
   bool operator==(const RunTimeModel&) const = default;
 };

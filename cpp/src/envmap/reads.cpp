@@ -1,0 +1,224 @@
+#include "mirrorbake/envmap/reads.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/projection/cube.hpp"
+
+namespace mirrorbake {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, LookupFilter>, 4> kFilters{
+    {{"nearest", LookupFilter::nearest},
+     {"bilinear", LookupFilter::bilinear},
+     {"trilinear", LookupFilter::trilinear},
+     {"anisotropic", LookupFilter::anisotropic}}};
+
+// Up to this elongation a footprint is round enough for one tap.
+constexpr float kRound = 1.25F;
+
+// A point of a face, (0, 0) its top left corner, (1, 1) its bottom right one.
+struct FacePoint {
+  int face;
+  float s, t;
+};
+
+FacePoint face_point(TopologyKind kind, glm::vec3 d) {
+  switch (kind) {
+    case TopologyKind::cube: {
+      const CubeCoordinates c = cube_from_direction(d);
+      return {c.face, c.s, c.t};
+    }
+    case TopologyKind::dual_paraboloid: {
+      const glm::dvec3 e(d);
+      const double size = glm::length(e) + std::abs(e.z);
+      return {d.z >= 0.0F ? 0 : 1, static_cast<float>(0.5 + 0.5 * e.x / size),
+              static_cast<float>(0.5 - 0.5 * e.y / size)};
+    }
+    case TopologyKind::atlas: break;
+  }
+  return {0, d.x, d.y};
+}
+
+// Squared lengths on the face, whose sides have length 1, of changes of the direction.
+float cube_length2(glm::vec3 d, int axis, glm::vec3 change) {
+  // Derivative of the face coordinates ½ + ½ d/|major|, by the quotient rule.
+  const float major = std::abs(d[axis]);
+  const float sign = d[axis] < 0.0F ? -1.0F : 1.0F;
+  glm::vec3 on_face = (change - d / major * (sign * change[axis])) / major;
+  on_face[axis] = 0.0F;
+  return 0.25F * glm::dot(on_face, on_face);
+}
+
+float paraboloid_length2(glm::vec3 d, glm::vec3 change) {
+  // The same of ½ + ½ (x, y) / (|d| + |z|).
+  const float length = glm::length(d);
+  const float size = length + std::abs(d.z);
+  const float growth = glm::dot(d, change) / length + (d.z < 0.0F ? -change.z : change.z);
+  const glm::vec2 on_face = (glm::vec2(change) - glm::vec2(d) * (growth / size)) / size;
+  return 0.25F * glm::dot(on_face, on_face);
+}
+
+void add_nearest(const TexelTopology& topology, glm::vec3 direction, TexelReads& reads) {
+  const FacePoint p = face_point(topology.kind(), direction);
+  const auto texel = [](float s, int count) {
+    return std::clamp(static_cast<int>(s * static_cast<float>(count)), 0, count - 1);
+  };
+  reads.add(topology.index({0, p.face, texel(p.t, topology.height(0)), texel(p.s, topology.width(0))}), 1.0F);
+}
+
+}  // namespace
+
+LookupFilter parse_lookup_filter(std::string_view name) {
+  for (const auto& [text, filter] : kFilters) {
+    if (text == name) return filter;
+  }
+  throw InvalidArgument("filter", "'" + std::string(name) + "'",
+                        "nearest, bilinear, trilinear or anisotropic");
+}
+
+std::string_view name_of(LookupFilter filter) { return kFilters[static_cast<std::size_t>(filter)].first; }
+
+TapPattern tap_pattern(float major, float minor, int max_taps, int levels) {
+  TapPattern pattern;
+  const float coarsest = static_cast<float>(levels - 1);
+  if (!(major > 1.0F)) {
+    // Also for lengths that are not numbers.
+    pattern.level = std::isnan(major) ? coarsest : 0.0F;
+    pattern.weights[0] = 1.0F;
+    return pattern;
+  }
+  const float most = static_cast<float>(max_taps);
+  const float elongation = std::clamp(major / std::max(minor, 1.0F), 1.0F, most);
+  const float n = std::isfinite(elongation) ? elongation : 1.0F;
+  pattern.level = std::clamp(std::log2(major / n), 0.0F, coarsest);
+  if (n <= kRound) {
+    pattern.weights[0] = 1.0F;
+    return pattern;
+  }
+  const int pairs = static_cast<int>(std::ceil(0.5F * n));
+  pattern.taps = 2 * pairs;
+  for (int pair = 0; pair < pairs; ++pair) {
+    // The outermost pair takes the middles of what the others leave of the differential.
+    const float inner = static_cast<float>(pair);
+    const bool outermost = pair + 1 == pairs;
+    const float share = outermost ? 0.5F * n - inner : 1.0F;
+    const float offset = pairs == 1  ? 0.25F * (n - kRound) / (2.0F - kRound)
+                         : outermost ? 0.5F * (inner / n + 0.5F)
+                                     : (inner + 0.5F) / n;
+    for (int side = 0; side < 2; ++side) {
+      const auto tap = static_cast<std::size_t>(2 * pair + side);
+      pattern.offsets[tap] = side == 0 ? offset : -offset;
+      pattern.weights[tap] = share / n;
+    }
+  }
+  return pattern;
+}
+
+TexelLengths texel_lengths(const TexelTopology& topology, const Footprint& footprint) {
+  const glm::vec3 d = footprint.direction;
+  const float side = static_cast<float>(topology.width(0));
+  switch (topology.kind()) {
+    case TopologyKind::cube: {
+      const glm::vec3 a = glm::abs(d);
+      int axis = a.y > a.x ? 1 : 0;
+      if (a.z > a[axis]) axis = 2;
+      return {side * std::sqrt(cube_length2(d, axis, footprint.ddx)),
+              side * std::sqrt(cube_length2(d, axis, footprint.ddy))};
+    }
+    case TopologyKind::dual_paraboloid:
+      return {side * std::sqrt(paraboloid_length2(d, footprint.ddx)),
+              side * std::sqrt(paraboloid_length2(d, footprint.ddy))};
+    case TopologyKind::atlas: break;
+  }
+  const glm::vec2 sides(side, static_cast<float>(topology.height(0)));
+  return {glm::length(glm::vec2(footprint.ddx) * sides), glm::length(glm::vec2(footprint.ddy) * sides)};
+}
+
+void add_bilinear(const TexelTopology& topology, int level, glm::vec3 direction, float scale,
+                  TexelReads& reads) {
+  const int width = topology.width(level);
+  const int height = topology.height(level);
+  const FacePoint p = face_point(topology.kind(), direction);
+  const float x = std::clamp(p.s * static_cast<float>(width) - 0.5F, -0.5F, static_cast<float>(width) - 0.5F);
+  const float y =
+      std::clamp(p.t * static_cast<float>(height) - 0.5F, -0.5F, static_cast<float>(height) - 0.5F);
+  const int column = static_cast<int>(std::floor(x));
+  const int row = static_cast<int>(std::floor(y));
+  const float fx = x - static_cast<float>(column);
+  const float fy = y - static_cast<float>(row);
+  const float weights[4] = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
+
+  if (row >= 0 && column >= 0 && row + 1 < height && column + 1 < width) {
+    const std::uint32_t first = topology.index({level, p.face, row, column});
+    const std::uint32_t below = first + static_cast<std::uint32_t>(width);
+    reads.add(first, scale * weights[0]);
+    reads.add(first + 1, scale * weights[1]);
+    reads.add(below, scale * weights[2]);
+    reads.add(below + 1, scale * weights[3]);
+    return;
+  }
+
+  const int first = reads.count;
+  float missing = 0.0F;  // weight of the texel that a corner of the cube lacks
+  for (int i = 0; i < 4; ++i) {
+    const int r = row + i / 2;
+    const int c = column + i % 2;
+    const bool at_corner = (r < 0 || r >= height) && (c < 0 || c >= width);
+    if (at_corner && topology.kind() == TopologyKind::cube) {
+      missing = weights[i];
+    } else if (topology.kind() == TopologyKind::cube) {
+      reads.add(topology.texel_at({level, p.face, r, c}), scale * weights[i]);
+    } else {
+      reads.add(topology.index({level, p.face, std::clamp(r, 0, height - 1), std::clamp(c, 0, width - 1)}),
+                scale * weights[i]);
+    }
+  }
+  if (missing > 0.0F) {
+    for (int i = first; i < reads.count; ++i) {
+      reads.texels[static_cast<std::size_t>(i)].weight += scale * missing / 3.0F;
+    }
+  }
+}
+
+void add_trilinear(const TexelTopology& topology, float level, glm::vec3 direction, float scale,
+                   TexelReads& reads) {
+  const float clamped = std::clamp(level, 0.0F, static_cast<float>(topology.levels() - 1));
+  const int finer = static_cast<int>(clamped);
+  const float fraction = clamped - static_cast<float>(finer);
+  add_bilinear(topology, finer, direction, scale * (1.0F - fraction), reads);
+  if (fraction > 0.0F) add_bilinear(topology, finer + 1, direction, scale * fraction, reads);
+}
+
+TexelReads reads(const TexelTopology& topology, const Footprint& footprint, const ReadFilter& filter) {
+  TexelReads result;
+  if (filter.kind == LookupFilter::nearest) {
+    add_nearest(topology, footprint.direction, result);
+    return result;
+  }
+  if (filter.kind == LookupFilter::bilinear) {
+    add_bilinear(topology, 0, footprint.direction, 1.0F, result);
+    return result;
+  }
+  const TexelLengths lengths = texel_lengths(topology, footprint);
+  const bool along_y = lengths.ddy > lengths.ddx;
+  const float major = along_y ? lengths.ddy : lengths.ddx;
+  const float minor = along_y ? lengths.ddx : lengths.ddy;
+  const int most = filter.kind == LookupFilter::trilinear ? 1 : filter.max_taps;
+  const TapPattern pattern = tap_pattern(major, minor, most, topology.levels());
+  const glm::vec3 longer = along_y ? footprint.ddy : footprint.ddx;
+  for (std::size_t tap = 0; tap < static_cast<std::size_t>(pattern.taps); ++tap) {
+    const glm::vec3 direction =
+        pattern.taps == 1 ? footprint.direction : footprint.direction + pattern.offsets[tap] * longer;
+    add_trilinear(topology, pattern.level, direction, pattern.weights[tap], result);
+  }
+  return result;
+}
+
+}  // namespace mirrorbake

@@ -23,9 +23,10 @@ def report_command(
 ) -> None:
     """Evaluate a PEM and write a page about it, with pictures to compare, that needs no other file."""
     from mirrorbake.evaluate.report import report
+    from mirrorbake.study.trade.show import section
 
     limit = _core.ThreadLimit(threads)
     with progress() as add_bar:
-        path = report(directory, out, add_bar("report"))
+        path = report(directory, out, add_bar("report"), sections=[section])
     del limit
     messages.print(f"wrote {path}", markup=False, soft_wrap=True)

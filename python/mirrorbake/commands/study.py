@@ -3,19 +3,36 @@
 from __future__ import annotations
 
 import json as json_module
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.table import Table
+from typer.core import TyperGroup
 
 from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
+from mirrorbake.commands.options import Assignments, Seed, Threads, scene_config
+from mirrorbake.commands.progress import messages, progress
 from mirrorbake.errors import OptionError
 
-app = typer.Typer(help="Measure what approximations cost and how far off they are.", no_args_is_help=True)
 
+class _StudyGroup(TyperGroup):
+    """`study SCENE` measures a scene; `study NAME`, one approximation by itself."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if args and args[0] not in self.commands and args[0] != "--help":
+            args = ["scene", *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=_StudyGroup,
+    help="What approximations cost and how far off they are: a scene's (study SCENE.toml), or alone.",
+    no_args_is_help=True,
+)
 
 Json = Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for plots. [default: none]")]
@@ -28,6 +45,57 @@ def _root() -> None:
 
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}"
+
+
+@app.command("scene")
+@reports_errors
+def scene_command(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)],
+    axes: Annotated[
+        str, typer.Option("--axes", metavar="A,B,…", help="Choices to study, by name. [default: all]")
+    ] = "",
+    minutes: Annotated[
+        float | None,
+        typer.Option("--minutes", min=0.0, metavar="M", help="No trial begins later. [default: no limit]"),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for results; goes on with a study in it.")
+    ] = Path("out/study"),
+    assignments: Assignments = None,
+    seed: Seed = None,
+    json: Json = False,
+    threads: Threads = 0,
+) -> None:
+    """Time and bytes against error on a scene of your own: choice by choice, then the best combinations.
+
+    `mirrorbake study SCENE.toml` is short for it.
+    """
+    from mirrorbake.study.trade import show
+    from mirrorbake.study.trade.study import advice, study
+
+    config = scene_config(scene, assignments, None, None, None, None, seed)
+    names = [name.strip() for name in axes.split(",") if name.strip()]
+    with _core.ThreadLimit(threads), progress() as add_bar:
+        result = study(config, out, names, minutes, add_bar("study"))
+    show.plot(result, out / show.PLOT_NAME)
+    if json:
+        typer.echo(json_module.dumps(show.as_json(result)))
+    else:
+        console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
+        for table in show.tables(result):
+            console.print(table)
+        for words in advice(result):
+            console.print(f"- {words}", markup=False, soft_wrap=True)
+    made = 1 + len(result.trials)
+    if made < result.planned:
+        messages.print(
+            f"note: {made} of {result.planned} trials within the time; the same command goes on",
+            markup=False,
+            soft_wrap=True,
+        )
+    for settings, reason in result.refused.items():
+        messages.print(f"note: {settings}: not possible: {reason}", markup=False, soft_wrap=True)
+    messages.print(f"wrote {out / show.PLOT_NAME}", markup=False, soft_wrap=True)
 
 
 @app.command("fresnel")

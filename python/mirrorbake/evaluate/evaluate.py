@@ -26,7 +26,7 @@ from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.store import PemStore
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -149,14 +149,29 @@ class SeenView:
 
 
 class Onlooker:
-    """Looks at a PEM from any view: reference and contenders."""
+    """Looks at a PEM from any view: reference and contenders.
 
-    def __init__(self, pem: OpenedPem) -> None:
+    References are kept in the folder `references`, by default beside the PEM; `only` these contenders look;
+    new references get a `margin` in dB.
+    """
+
+    def __init__(
+        self,
+        pem: OpenedPem,
+        references: Path | None = None,
+        only: Collection[str] = CONTENDERS,
+        margin: float = MARGIN_DECIBELS,
+    ) -> None:
         self.pem = pem
+        self._margin = margin
         self.cache = ReferenceCache(
-            pem.store.directory / REFERENCES_NAME, pem.store.header.source, pem.store.header.plan.depth
+            references or pem.store.directory / REFERENCES_NAME,
+            pem.store.header.source,
+            pem.store.header.plan.depth,
         )
-        self.contenders: dict[str, Contender] = contenders_of(pem)
+        self.contenders: dict[str, Contender] = {
+            name: contender for name, contender in contenders_of(pem).items() if name in only
+        }
 
     def look(self, view: View) -> SeenView | None:
         """Return a view with a reference that is good enough for it; None if the object is not in it."""
@@ -175,7 +190,7 @@ class Onlooker:
             errors = [reference.error(image) for image in images]
             return None if None in errors else min(error for error in errors if error is not None)
 
-        reference = refined_reference(stage, view.camera, window, self.cache, best_error)
+        reference = refined_reference(stage, view.camera, window, self.cache, best_error, self._margin)
         return SeenView(view, reference, pictures) if reference.mask.any() else None
 
 

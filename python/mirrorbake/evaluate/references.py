@@ -269,6 +269,7 @@ def refined_reference(
     window: Window,
     cache: ReferenceCache,
     best_error: Callable[[Reference], float | None],
+    margin: float = MARGIN_DECIBELS,
 ) -> Reference:
     """A reference whose noise lies at least 6 dB below the smallest error that it measures.
 
@@ -282,6 +283,8 @@ def refined_reference(
         Where references are looked for and kept.
     best_error
         The smallest mean squared error that a reference finds; None where its noise hides one.
+    margin
+        dB that a reference without enough gets to spare: more than 6 if better pictures will follow.
 
     Returns
     -------
@@ -294,9 +297,10 @@ def refined_reference(
         reference = trace_reference(stage, camera, window, FIRST_SAMPLES)
     while reference.mask.any() and reference.noise > 0.0 and reference.samples < MOST_SAMPLES:
         error = best_error(reference)
-        allowed = (error if error is not None else reference.noise) * 10.0 ** (-MARGIN_DECIBELS / 10.0)
-        if reference.noise <= allowed:
+        measured = error if error is not None else reference.noise
+        if reference.noise <= measured * 10.0 ** (-MARGIN_DECIBELS / 10.0):
             break
+        allowed = measured * 10.0 ** (-margin / 10.0)
         # A little more than noise that falls as 1/samples asks for: another round costs more than that.
         wanted = 1.15 * reference.samples * min(reference.noise / allowed, 16.0)
         reference = extend_reference(stage, camera, reference, min(math.ceil(wanted), MOST_SAMPLES))

@@ -11,7 +11,7 @@ from mirrorbake import _core
 from mirrorbake.proxy import proxy_from_attributes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -52,6 +52,8 @@ class RunTime:
     store: PemStore
     triangles: NDArray[np.uint32]
     """(T, 3) of the reflector."""
+    remap: Callable[[FloatArray], FloatArray] | None = None
+    """What a map (texels, C) of a view becomes before it is drawn; None: it stays as it is stored."""
 
     def __post_init__(self) -> None:
         self._header: Header = self.store.header
@@ -115,7 +117,8 @@ class RunTime:
         return parts
 
     def _read_view(self, index: int) -> dict[tuple[str, str], FloatArray]:
-        return {name: self.store.read_map(*name, index) for name in self._header.map_names()}
+        maps = {name: self.store.read_map(*name, index) for name in self._header.map_names()}
+        return maps if self.remap is None else {name: self.remap(texels) for name, texels in maps.items()}
 
     def _static_parts(self, shape: str) -> list[list[_core.ShellMap]]:
         proxy = proxy_from_attributes(self._header.static[shape])

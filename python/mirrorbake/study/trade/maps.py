@@ -1,0 +1,133 @@
+"""Other ways to store the maps of a PEM: where the coarser levels come from, and how a texel is coded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numcodecs
+import numpy as np
+
+from mirrorbake.envmap import EnvMap
+from mirrorbake.pem.pyramid import coarser_sizes, decimate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from mirrorbake.arrays import FloatArray
+
+LOG_FLOOR = 2.0**-8
+"""ε of the logarithmic code: what is darker has few codes left."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """A rule that makes the coarser levels of a map from other data, so that they need not be stored."""
+
+    name: str
+    coarser: Callable[[FloatArray, FloatArray], list[FloatArray]]
+    """Levels (6, s, s, C) below the finest, of the finest (6, S, S, C) and a captured pyramid (texels, 3)."""
+
+    def apply(self, pyramid: FloatArray, size: int, capture: FloatArray) -> FloatArray:
+        """Return a pyramid (texels, C) with its coarser levels made anew."""
+        channels = pyramid.shape[1]
+        finest = pyramid[: 6 * size * size].reshape(6, size, size, channels)
+        levels = [finest, *self.coarser(finest, capture)]
+        return np.concatenate([level.reshape(-1, channels) for level in levels])
+
+
+def _decimated(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
+    levels = []
+    for _ in coarser_sizes(finest.shape[1]):
+        finest = decimate(finest)
+        levels.append(finest)
+    return levels
+
+
+def _solid_angle(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
+    filtered = EnvMap.from_array(finest, "cube").mips("seamless")
+    return [filtered.level(level) for level in range(1, filtered.levels)]
+
+
+def _captured(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
+    if finest.shape[3] != 3:
+        # Nothing of the object itself is captured from its centre.
+        return _decimated(finest, capture)
+    levels, start = [], 6 * finest.shape[1] ** 2
+    for size in coarser_sizes(finest.shape[1]):
+        levels.append(capture[start : start + 6 * size * size].reshape(6, size, size, 3))
+        start += 6 * size * size
+    return levels
+
+
+LEVELS = (
+    Levels("decimated", _decimated),
+    Levels("solid angle", _solid_angle),
+    Levels("captured", _captured),
+)
+"""Means of 2×2 texels; filtered by solid angle and across edges; those of the captured map."""
+
+
+@dataclass(frozen=True)
+class Storage:
+    """A code of 8 bits per channel."""
+
+    name: str
+    encode: Callable[[FloatArray], NDArray[np.uint8]]
+    """Codes of a pyramid (texels, C); the fourth channel is coverage."""
+    decode: Callable[[NDArray[np.uint8], FloatArray], FloatArray]
+    """The pyramid that codes stand for, given the one that they were made of for its range."""
+
+    def apply(self, pyramid: FloatArray) -> FloatArray:
+        """Return a pyramid as it comes back from storage."""
+        return self.decode(self.encode(pyramid), pyramid)
+
+
+def _coverage(codes: NDArray[np.uint8]) -> FloatArray:
+    return codes[:, 3:].astype(np.float32) / np.float32(255.0)
+
+
+def _encode_coverage(pyramid: FloatArray) -> NDArray[np.uint8]:
+    return (np.clip(pyramid[:, 3:], 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+
+def _log_range(pyramid: FloatArray) -> tuple[float, float]:
+    low = float(np.log2(LOG_FLOOR))
+    return low, max(float(np.log2(pyramid[:, :3].max(initial=0.0) + LOG_FLOOR)), low + 1.0)
+
+
+def _encode_log(pyramid: FloatArray) -> NDArray[np.uint8]:
+    low, high = _log_range(pyramid)
+    logarithm = np.log2(np.maximum(pyramid[:, :3], 0.0) + LOG_FLOOR)
+    codes = (np.clip((logarithm - low) / (high - low), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    return np.concatenate([codes, _encode_coverage(pyramid)], axis=1)
+
+
+def _decode_log(codes: NDArray[np.uint8], pyramid: FloatArray) -> FloatArray:
+    low, high = _log_range(pyramid)
+    light = 2.0 ** (low + codes[:, :3].astype(np.float32) / 255.0 * (high - low)) - LOG_FLOOR
+    return np.concatenate([np.maximum(light, 0.0), _coverage(codes)], axis=1).astype(np.float32)
+
+
+def _encode_linear(pyramid: FloatArray) -> NDArray[np.uint8]:
+    codes = (np.clip(pyramid[:, :3], 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    return np.concatenate([codes, _encode_coverage(pyramid)], axis=1)
+
+
+def _decode_linear(codes: NDArray[np.uint8], pyramid: FloatArray) -> FloatArray:
+    return codes.astype(np.float32) / np.float32(255.0)
+
+
+STORAGES = (
+    Storage("8-bit log", _encode_log, _decode_log),
+    Storage("8-bit linear, clipped", _encode_linear, _decode_linear),
+)
+"""The code of the web format, and that of [PEM], whose maps end at 1."""
+
+
+def packed_bytes(values: NDArray[Any]) -> int:
+    """Bytes of an array, losslessly compressed as a PEM's chunks are."""
+    codec = numcodecs.Blosc(cname="zstd", clevel=3, shuffle=numcodecs.Blosc.SHUFFLE)
+    return len(codec.encode(np.ascontiguousarray(values)))

@@ -1,0 +1,374 @@
+"""The trade of time and bytes against error on the user's own scene: axis by axis, then combinations."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from mirrorbake import _core
+from mirrorbake.bake.analyze import analyze
+from mirrorbake.errors import InputError, OptionError
+from mirrorbake.files import write_text
+from mirrorbake.scene.inputs import hash_inputs
+from mirrorbake.scene.stage import prepare_stage
+from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of, log_ratio
+from mirrorbake.study.trade.trial import Bench, Trial, overridden
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from mirrorbake.bake.bake import ProgressReport
+    from mirrorbake.scene.config import SceneConfig
+
+STUDY_NAME = "study.json"
+STUDIED_VIEWS = 3
+"""Maps of a trial: a sample with a neighbour on either side."""
+COMBINATIONS = 16
+"""Tried at most, after the single axes."""
+NOTICEABLE = 0.1
+"""dB that a dearer choice has to gain to be on the front: the figures of another seed differ by less."""
+MOST_COMBINED = 50_000
+
+COSTS = ("bytes_per_degree", "bake_s", "draw_ms")
+"""What is traded against error."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """What was measured."""
+
+    base: Trial
+    """The scene's own choice."""
+    axes: list[Axis]
+    trials: list[Trial]
+    """With one setting changed, by axis; then combinations."""
+    planned: int
+    """Trials that there are to make; more than there are `trials` if the time was up."""
+    refused: dict[str, str] = field(default_factory=dict)
+    """Settings that the scene cannot be baked with, and why."""
+
+    @property
+    def all(self) -> list[Trial]:
+        """All trials, the scene's own first."""
+        return [self.base, *self.trials]
+
+    def front(self, cost: str) -> list[Trial]:
+        """Trials that no cheaper one is as good as: the Pareto front, cheapest first.
+
+        Parameters
+        ----------
+        cost
+            One of `COSTS`.
+        """
+        found: list[Trial] = []
+        best = -1e9
+        for trial in sorted(self.all, key=lambda trial: (getattr(trial, cost), -(trial.near or -1e9))):
+            if trial.near is not None and trial.near > best + NOTICEABLE:
+                found.append(trial)
+                best = trial.near
+        return found
+
+    def of_axis(self, axis: str) -> list[Trial]:
+        """Trials that differ from the scene's own in this axis alone."""
+        return [trial for trial in self.trials if list(trial.settings) == [axis]]
+
+
+def study(
+    config: SceneConfig,
+    folder: Path,
+    axes: Sequence[str] = (),
+    minutes: float | None = None,
+    progress: ProgressReport | None = None,
+    combinations: int = COMBINATIONS,
+) -> Study:
+    """Measure what a scene's choices cost and how far off they are.
+
+    A few views from the middle of the arc are baked with each setting, looked at from a sample, between two
+    and 5° past the last, and compared with references that all trials share. What is measured is kept in
+    `folder`/study.json after every trial: an interrupted study goes on where it stopped.
+
+    Parameters
+    ----------
+    config
+        The scene.
+    folder
+        Made if it does not exist.
+    axes
+        Names of the axes; none: all that the scene has.
+    minutes
+        After which no further trial begins. None: no limit.
+    progress
+        Told about every trial.
+    combinations
+        Tried at most, after the single axes.
+
+    Raises
+    ------
+    OptionError
+        An axis does not exist, or the scene does not have it.
+    InputError
+        The scene is not usable, or its object is not seen, or the folder holds a study of another scene.
+    """
+    began = time.monotonic()
+    report = progress or (lambda done, total, text: None)
+    for name in axes:
+        if name not in AXIS_NAMES:
+            raise OptionError(f"--axes {name}: expected some of {', '.join(AXIS_NAMES)}")
+    report(0, 1, "preparing the scene")
+    folder.mkdir(parents=True, exist_ok=True)
+    notebook = _Notebook(folder / STUDY_NAME, _identity(config))
+    base_config = _studied(config)
+    chosen = [axis for axis in axes_of(base_config) if not axes or axis.name in axes]
+    if axes and len(chosen) < len(set(axes)):
+        missing = sorted(set(axes) - {axis.name for axis in chosen})
+        raise OptionError(f"--axes {missing[0]}: this scene has no such choice")
+    bench = Bench(base_config, folder)
+    singles = [{axis.name: setting} for axis in chosen for setting in axis.settings[1:]]
+    planned = 1 + len(singles)
+    done: list[Trial] = []
+    costs: list[float] = []
+
+    def measure(settings: Mapping[str, Setting]) -> Trial | None:
+        """The trial of some settings; None where time is up or the scene refuses."""
+        kept = notebook.find(settings)
+        if kept is not None or notebook.refusal(settings) is not None:
+            return kept
+        expected = max(costs[-5:], default=0.0)
+        if minutes is not None and done and time.monotonic() - began + expected > 60.0 * minutes:
+            return None
+        start = time.monotonic()
+        try:
+            trial = bench.measure(settings)
+        except InputError as failure:
+            notebook.refuse(settings, str(failure))
+            return None
+        costs.append(time.monotonic() - start)
+        notebook.keep(trial)
+        return trial
+
+    report(0, planned, "the scene's own choice")
+    base = measure({})
+    if base is None or base.near is None:
+        raise InputError("study: no pixel of the views in the middle of the arc is wholly the object's")
+    done.append(base)
+    for step, settings in enumerate(singles, start=1):
+        report(step, planned, _words(settings))
+        trial = measure(settings)
+        if trial is not None:
+            done.append(trial)
+    promising = _promising(base, chosen, done[1:], combinations)
+    planned += len(promising)
+    for step, settings in enumerate(promising, start=1 + len(singles)):
+        report(step, planned, _words(settings))
+        trial = measure(settings)
+        if trial is not None:
+            done.append(trial)
+    report(planned, planned, f"{len(done)} trials")
+    result = Study(base, chosen, done[1:], planned - len(notebook.refused), dict(notebook.refused))
+    notebook.finish(summary(result))
+    return result
+
+
+def _words(settings: Mapping[str, Setting]) -> str:
+    return ", ".join(f"{axis} {setting.label}" for axis, setting in settings.items())
+
+
+def _studied(config: SceneConfig) -> SceneConfig:
+    """The scene with few views in the middle of its arc, and what is "auto" decided."""
+    views = config.views
+    if views.kind != "arc":
+        raise InputError(f"views.kind = {views.kind!r}: a study needs views on an arc")
+    if views.count > 1:
+        step = views.degrees / (views.count - 1)
+        middle = views.start + step * ((views.count - 1) // 2)
+        overrides: dict[str, Any] = {
+            "views.count": STUDIED_VIEWS,
+            "views.start": middle - step * (STUDIED_VIEWS // 2),
+            "views.degrees": step * (STUDIED_VIEWS - 1),
+        }
+        config = overridden(config, overrides)
+    stage = prepare_stage(config)
+    plan = analyze(stage)
+    decided = {
+        "trace.depth": plan.depth,
+        "trace.samples": plan.samples,
+        "maps.size": plan.map_size,
+        "maps.distant": plan.value("maps.distant"),
+    }
+    return overridden(config, decided)
+
+
+def _identity(config: SceneConfig) -> str:
+    """Changes with the scene, its files and the library: what a study may go on with."""
+    inputs = {key: {**value, "path": None} for key, value in hash_inputs(config).items()}
+    text = json.dumps([_core.version(), json.loads(config.model_dump_json()), inputs], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class _Notebook:
+    """Trials on disk, written after each."""
+
+    def __init__(self, path: Path, identity: str) -> None:
+        self._path, self._identity = path, identity
+        self._trials: dict[str, Trial] = {}
+        self.refused: dict[str, str] = {}
+        if not path.exists():
+            return
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            if data["identity"] != identity:
+                raise InputError(f"{path}: a study of another scene; give another folder with --out")
+            trials = [Trial.from_json(trial) for trial in data["trials"]]
+            self.refused = dict(data["refused"])
+        except (OSError, ValueError, KeyError, TypeError) as failure:
+            if isinstance(failure, InputError):
+                raise
+            raise InputError(f"{path}: damaged, or not a study: {failure}") from None
+        self._trials = {_name(trial.settings): trial for trial in trials}
+
+    def find(self, settings: Mapping[str, Setting]) -> Trial | None:
+        return self._trials.get(_name({axis: setting.label for axis, setting in settings.items()}))
+
+    def refusal(self, settings: Mapping[str, Setting]) -> str | None:
+        return self.refused.get(_words(settings))
+
+    def refuse(self, settings: Mapping[str, Setting], reason: str) -> None:
+        self.refused[_words(settings)] = reason
+        self._write()
+
+    def keep(self, trial: Trial) -> None:
+        self._trials[_name(trial.settings)] = trial
+        self._write()
+
+    def finish(self, results: Mapping[str, Any]) -> None:
+        """Add what follows from the trials, for reports."""
+        self._write(results)
+
+    def _write(self, results: Mapping[str, Any] | None = None) -> None:
+        data = {
+            "identity": self._identity,
+            "library": _core.version(),
+            "trials": [trial.to_json() for trial in self._trials.values()],
+            "refused": self.refused,
+            **(results or {}),
+        }
+        write_text(self._path, json.dumps(data, indent=1) + "\n")
+
+
+def _name(settings: Mapping[str, str]) -> str:
+    return json.dumps(sorted(settings.items()))
+
+
+@dataclass(frozen=True)
+class _Move:
+    """What one setting changes."""
+
+    axis: str
+    setting: Setting
+    octaves: tuple[float, float]
+    """Of bytes and of bake time."""
+    gain: float
+    """dB."""
+
+
+def _promising(
+    base: Trial, axes: Sequence[Axis], singles: Sequence[Trial], count: int
+) -> list[dict[str, Setting]]:
+    """Combinations that the single axes foretell to be on a front.
+
+    Axes are taken to act independently: ratios of costs multiply, gains in dB add. Of all combinations of
+    settings that trade something, those on the foretold fronts of bytes and of bake time are tried, evenly
+    over the front.
+    """
+    options: list[list[_Move]] = []
+    for axis in axes:
+        moves: list[_Move] = []
+        for trial in singles:
+            if list(trial.settings) == [axis.name] and trial.near is not None and base.near is not None:
+                ratios = (
+                    log_ratio(trial.bytes_per_degree, base.bytes_per_degree),
+                    log_ratio(trial.bake_s, base.bake_s),
+                )
+                gain = trial.near - base.near
+                # Worse and no cheaper: no part of any front.
+                if gain > NOTICEABLE or min(ratios) < -0.1:
+                    moves.append(_Move(axis.name, axis.setting(trial.settings[axis.name]), ratios, gain))
+        if moves:
+            options.append(sorted(moves, key=lambda move: -abs(move.gain))[:3])
+    # The axes that matter most, as many as can be combined.
+    options.sort(key=lambda moves: -max(abs(move.gain) + abs(move.octaves[0]) for move in moves))
+    sizes = itertools.accumulate((1 + len(moves) for moves in options), lambda a, b: a * b)
+    options = [moves for moves, size in zip(options, sizes, strict=True) if size <= MOST_COMBINED]
+    foretold = []
+    for choice in itertools.product(*([None, *moves] for moves in options)):
+        taken = [move for move in choice if move is not None]
+        if len(taken) > 1:
+            gain = sum(move.gain for move in taken)
+            ratios = (sum(move.octaves[0] for move in taken), sum(move.octaves[1] for move in taken))
+            foretold.append((ratios, gain, {move.axis: move.setting for move in taken}))
+    chosen: dict[str, dict[str, Setting]] = {}
+    for cost in range(2):
+        best, front = -1e9, []
+        for ratios, gain, settings in sorted(foretold, key=lambda item: (item[0][cost], -item[1])):
+            if gain > best + NOTICEABLE:
+                best = gain
+                front.append((ratios, gain, settings))
+        for _, _, settings in _evenly(front, count // 2):
+            chosen.setdefault(_words(settings), settings)
+    return list(chosen.values())
+
+
+def _evenly(items: list[Any], count: int) -> list[Any]:
+    if len(items) <= count:
+        return items
+    if count < 2:
+        return items[:count]
+    return [items[round(i * (len(items) - 1) / (count - 1))] for i in range(count)]
+
+
+def summary(result: Study) -> dict[str, Any]:
+    """Return the fronts, by cost, and the advice, as plain values."""
+    fronts = {cost: [trial.settings for trial in result.front(cost)] for cost in COSTS}
+    return {"fronts": fronts, "advice": advice(result)}
+
+
+def advice(result: Study) -> list[str]:
+    """Sentences that a person can act on: what can be saved for little, and what is worth its price."""
+    base = result.base
+    assert base.near is not None
+    savings, gains = [], []
+    for cost, noun in (("bytes_per_degree", "the bytes"), ("bake_s", "the time to bake")):
+        for axis in result.axes:
+            for trial in result.of_axis(axis.name):
+                if trial.near is None:
+                    continue
+                ratio, change = getattr(trial, cost) / getattr(base, cost), trial.near - base.near
+                words = f"{axis.title}: {trial.settings[axis.name]}"
+                if ratio < 0.85 and change > -1.5:
+                    effect = f"cost {-change:.1f} dB" if change <= -0.05 else "cost nothing"
+                    effect = f"and {change:.1f} dB more" if change >= 0.05 else effect
+                    price = change / -log_ratio(ratio, 1.0)
+                    savings.append((price, f"{share(ratio)} {noun} {effect} ({words})"))
+                elif change > 0.3 and cost == "bake_s":
+                    gains.append((change, f"{change:.1f} dB more for {share(ratio)} {noun} ({words})"))
+    ordered = [words for _, words in sorted(savings, reverse=True)[:4]]
+    return ordered + [words for _, words in sorted(gains, reverse=True)[:3]]
+
+
+def share(ratio: float) -> str:
+    """Words for a ratio: half, a third, twice, 3.4 times.
+
+    >>> [share(r) for r in (0.26, 0.5, 0.7, 1.0, 1.96, 3.4)]
+    ['a quarter of', 'half', '70 % of', 'the same', 'twice', '3.4 times']
+    """
+    for value, words in ((0.25, "a quarter of"), (1 / 3, "a third of"), (0.5, "half"), (2.0, "twice")):
+        if abs(ratio / value - 1.0) < 0.06:
+            return words
+    if abs(ratio - 1.0) < 0.05:
+        return "the same"
+    return f"{ratio:.0%}".replace("%", " % of") if ratio < 1.0 else f"{ratio:.2g} times"

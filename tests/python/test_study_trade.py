@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 SCENE = {
     "reflector": {"object": "teapot", "subdivisions": 4},
-    "views": {"count": 9, "degrees": 8.0, "start": 20.0, "size": [32, 24]},
+    "views": {"count": 9, "degrees": 8.0, "start": 20.0, "size": [64, 48]},
     "layers": {"local": True, "hull_split": True, "diffuse": False},
     "maps": {"size": 16, "distant": "box"},
-    "trace": {"samples": 4, "depth": 1, "indirect": "none"},
+    "trace": {"samples": 8, "depth": 1, "indirect": "none"},
 }
 
 

@@ -42,22 +42,35 @@ def export_command(
     precision: Annotated[
         str, typer.Option("--precision", metavar="half|float32", help="Of --maps.")
     ] = "half",
+    glb: Annotated[
+        Path | None,
+        typer.Option(
+            "--glb", metavar="OUT.glb", help="A glTF file with the mesh, its material and the maps."
+        ),
+    ] = None,
     sample: Annotated[
         int | None,
-        typer.Option("--sample", metavar="I", help="Of --maps: this sample's maps, not the static ones."),
+        typer.Option(
+            "--sample",
+            metavar="I",
+            help="This sample's maps: with --maps alone, with --glb beside the static.",
+        ),
     ] = None,
     all_samples: Annotated[
-        bool, typer.Option("--all", help="Of --maps: the static maps and those of all samples.")
+        bool, typer.Option("--all", help="The static maps and those of all samples.")
     ] = False,
     threads: Threads = 0,
 ) -> None:
-    """Write a PEM for other programs: its maps."""
-    if maps is None:
-        raise typer.BadParameter("nothing to write: give --maps")
+    """Write a PEM for other programs: its maps, a glTF file."""
+    if maps is None and glb is None:
+        raise typer.BadParameter("nothing to write: give --maps or --glb")
     if sample is not None and all_samples:
         raise typer.BadParameter("--sample and --all exclude each other")
     with _core.ThreadLimit(threads):
-        _export_maps(directory, maps, format, convention, precision, sample, all_samples)
+        if maps is not None:
+            _export_maps(directory, maps, format, convention, precision, sample, all_samples)
+        if glb is not None:
+            _export_glb(directory, glb, sample, all_samples)
 
 
 def _export_maps(
@@ -86,6 +99,24 @@ def _export_maps(
 
     export_maps(sets(), out, format=format, convention=convention, precision=precision, report=_print_message)
     _print_message(f"wrote {out / DESCRIPTION_NAME} and the maps that it names")
+
+
+def _export_glb(directory: Path, out: Path, sample: int | None, all_samples: bool) -> None:
+    from mirrorbake.files import check_writable
+    from mirrorbake.pem.export.glb import export_glb
+    from mirrorbake.pem.opened import unchanged_config
+    from mirrorbake.pem.store import PemStore
+    from mirrorbake.scene.build import build_scene
+
+    check_writable(out)
+    store = PemStore.open(directory)
+    store.require_complete()
+    samples = [] if sample is None else [sample]
+    if all_samples:
+        samples = list(range(len(store.header.parameters)))
+    built = build_scene(unchanged_config(store))
+    export_glb(store, built, out, samples=samples, report=_print_message)
+    _print_message(f"wrote {out}")
 
 
 def _print_message(text: str) -> None:

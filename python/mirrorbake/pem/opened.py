@@ -16,6 +16,7 @@ from mirrorbake.scene.stage import Stage, prepare_stage
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from mirrorbake.scene.config import SceneConfig
     from mirrorbake.scene.parameters import ParameterSpace
 
 
@@ -52,10 +53,16 @@ def open_pem(directory: Path, stage: Stage | None = None) -> OpenedPem:
     """
     store = PemStore.open(directory)
     store.require_complete()
-    source = store.header.source
-    config = parse_config(source.config, str(directory))
-    present = Source(source.library, source.config, hash_inputs(config))
-    if present.fingerprint != source.fingerprint:
-        raise StoreError(f"{directory}: its scene has changed ({present.difference_from(source)})")
+    config = unchanged_config(store)
     stage = (stage or prepare_stage(config)).planned(store.header.plan)
     return OpenedPem(store, stage, RunTime(store, stage.built.triangles))
+
+
+def unchanged_config(store: PemStore) -> SceneConfig:
+    """Return the scene that a PEM was baked from; raises StoreError and InputError as `open_pem` does."""
+    source = store.header.source
+    config = parse_config(source.config, str(store.directory))
+    present = Source(source.library, source.config, hash_inputs(config))
+    if present.fingerprint != source.fingerprint:
+        raise StoreError(f"{store.directory}: its scene has changed ({present.difference_from(source)})")
+    return config

@@ -1,0 +1,180 @@
+"""A PEM as one binary glTF file: a plain mesh for any viewer, the maps for those that know the extension."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.files import atomic_output, check_writable
+from mirrorbake.pem.export.glb_file import GlbFile
+from mirrorbake.pem.export.gltf_material import fresnel_description, gltf_material
+from mirrorbake.pem.export.map_sets import sample_set, static_set
+from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from mirrorbake.pem.export.map_sets import MapSet, ShellMap
+    from mirrorbake.pem.store import PemStore
+    from mirrorbake.scene.build import BuiltScene
+
+EXTENSION = "EXT_mirrorbake_pem"
+EXTENSION_VERSION = 1
+_BRIGHT_PERCENTILE = 99.0
+
+
+def export_glb(
+    store: PemStore,
+    built: BuiltScene,
+    out: Path,
+    *,
+    samples: Sequence[int] = (),
+    report: Callable[[str], None] | None = None,
+) -> None:
+    """Write the reflector's mesh, its material, the static set and, if wanted, maps of samples.
+
+    Parameters
+    ----------
+    store
+        A complete PEM.
+    built
+        The scene that it was baked from.
+    out
+        A .glb file, written whole or not at all.
+    samples
+        Numbers of the samples whose maps go into the file beside the static set.
+    report
+        Called with a sentence for each thing that the file lacks.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written, or would be larger than the format allows.
+    OptionError
+        There is no such sample.
+    """
+    check_writable(out)
+
+    def sets() -> Iterator[MapSet]:
+        yield static_set(store)
+        yield from (sample_set(store, index) for index in samples)
+
+    file = GlbFile()
+    material = built.scene.material(built.scene.object_material(built.reflector))
+    described, notes = gltf_material(material)
+    code = _code_for(sets())
+    extension = {
+        "version": EXTENSION_VERSION,
+        "footprintScale": store.header.source.config["infer"]["footprint_scale"],
+        "radianceCode": {"low": code.low, "high": code.high, "epsilon": code.epsilon},
+        "sets": [_add_set(file, maps, code) for maps in sets()],
+    }
+    described.setdefault("extensions", {})[EXTENSION] = {
+        "fresnel": fresnel_description(material.fresnel),
+        "layers": material.layers.name,
+        "albedo": list(material.albedo),
+    }
+    file.document.update(
+        {
+            "asset": {"version": "2.0", "generator": f"mirrorbake {_core.version()}"},
+            "extensionsUsed": sorted({EXTENSION, *described["extensions"]}),
+            "extensions": {EXTENSION: extension},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"name": "reflector", "mesh": 0}],
+            "meshes": [{"name": "reflector", "primitives": _add_mesh(file, store, built)}],
+            "materials": [described],
+        }
+    )
+    data = file.to_bytes()
+    with atomic_output(out) as temporary:
+        temporary.write_bytes(data)
+    for note in notes if report is not None else ():
+        assert report is not None
+        report(note)
+
+
+def _code_for(sets: Iterator[MapSet]) -> RadianceCode:
+    bright, largest = 0.0, 0.0
+    for maps in sets:
+        for shell in _shells(maps):
+            radiance = shell.pyramid[:, :3]
+            bright = max(bright, float(np.percentile(radiance, _BRIGHT_PERCENTILE)))
+            largest = max(largest, float(radiance.max()))
+    return RadianceCode.for_range(bright, largest)
+
+
+def _shells(maps: MapSet) -> Iterator[ShellMap]:
+    for shells in maps.parts.values():
+        yield from shells
+
+
+def _add_set(file: GlbFile, maps: MapSet, code: RadianceCode) -> dict[str, Any]:
+    written: dict[int, dict[str, Any]] = {}
+    parts = []
+    for part, shells in maps.parts.items():
+        for shell in shells:
+            if id(shell) not in written:
+                written[id(shell)] = _add_shell(file, f"{maps.name} {part} {shell.name}", shell, code)
+        parts.append({"name": part, "shells": [written[id(shell)] for shell in shells]})
+    description: dict[str, Any] = {"name": maps.name, "parts": parts}
+    if maps.parameter is not None:
+        description["parameter"] = maps.parameter
+    return description
+
+
+def _add_shell(file: GlbFile, name: str, shell: ShellMap, code: RadianceCode) -> dict[str, Any]:
+    radiance = to_atlas(code.encode(shell.pyramid[:, :3]), shell.size)
+    entry: dict[str, Any] = {
+        "name": shell.name,
+        "proxy": _proxy(shell.proxy),
+        "size": shell.size,
+        "radiance": file.add_png(f"{name} radiance", radiance.astype(np.uint8)),
+    }
+    if shell.channels == 4:
+        alpha = np.rint(255.0 * np.clip(shell.pyramid[:, 3:], 0.0, 1.0)).astype(np.uint8)
+        atlas = to_atlas(alpha, shell.size).astype(np.uint8)
+        entry["alpha"] = file.add_png(f"{name} alpha", atlas[..., 0])
+    return entry
+
+
+def _proxy(description: dict[str, Any]) -> dict[str, Any]:
+    names = {"half_extent": "halfExtent"}
+    return {names.get(key, key): value for key, value in description.items()}
+
+
+def _add_mesh(file: GlbFile, store: PemStore, built: BuiltScene) -> list[dict[str, Any]]:
+    """One primitive per part; in each, triangles on the hull come last."""
+    mesh = built.scene.object_mesh(built.reflector)
+    attributes = {"POSITION": file.add_vertices(np.asarray(built.positions, np.float32), bounds=True)}
+    if len(mesh.normals):
+        attributes["NORMAL"] = file.add_vertices(np.asarray(mesh.normals, np.float32))
+    if len(mesh.uvs):
+        uvs = np.asarray(mesh.uvs, np.float32) * np.array([1, -1], np.float32)
+        uvs[:, 1] += 1.0  # v down
+        attributes["TEXCOORD_0"] = file.add_vertices(uvs)
+    irradiance = store.read_irradiance()
+    if irradiance is not None:
+        attributes["_IRRADIANCE"] = file.add_vertices(irradiance)
+    local = store.read_local_triangles()
+    stacked = np.ones(len(built.triangles), np.bool_) if local is None else local != 0
+    primitives = []
+    for number in range(len(built.part_names)):
+        chosen = built.parts == number
+        if not chosen.any():
+            continue
+        triangles = np.concatenate([built.triangles[chosen & stacked], built.triangles[chosen & ~stacked]])
+        primitives.append(
+            {
+                "attributes": attributes,
+                "indices": file.add_indices(triangles.reshape(-1)),
+                "material": 0,
+                "extensions": {
+                    EXTENSION: {"part": number, "stackIndices": 3 * int((chosen & stacked).sum())}
+                },
+            }
+        )
+    return primitives

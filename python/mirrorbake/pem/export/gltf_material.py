@@ -1,0 +1,88 @@
+"""A reflector's material as near as glTF's comes to it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.fresnel import conductor
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+# Schlick and constant reflectances up to that of an index of 2.5 (diamond, titania) are those of dielectrics.
+_LARGEST_DIELECTRIC_R0 = ((2.5 - 1.0) / (2.5 + 1.0)) ** 2
+
+
+def gltf_material(material: _core.Material) -> tuple[dict[str, Any], list[str]]:
+    """Describe a material by glTF's metal or dielectric.
+
+    Returns
+    -------
+    tuple
+        The glTF material, and a sentence for each thing that glTF has no words for.
+    """
+    notes = []
+    fresnel = material.fresnel
+    albedo = list(material.albedo)
+    roughness = _perceptual_roughness(material)
+    result: dict[str, Any] = {"name": material.name}
+    r0 = _normal_reflectance(fresnel)
+    dielectric = fresnel.model == _core.FresnelModel.dielectric or (
+        fresnel.model != _core.FresnelModel.conductor and max(r0) <= _LARGEST_DIELECTRIC_R0
+    )
+    if dielectric:
+        # glTF: F0 = ((ior - 1)/(ior + 1))² · specularColorFactor, F90 = 1.
+        root = math.sqrt(max(r0))
+        result["pbrMetallicRoughness"] = _metallic_roughness(albedo, 0.0, roughness)
+        result["extensions"] = {"KHR_materials_ior": {"ior": (1.0 + root) / (1.0 - root)}}
+        if max(r0) > min(r0):
+            result["extensions"]["KHR_materials_specular"] = {
+                "specularColorFactor": [value / max(r0) for value in r0]
+            }
+    else:
+        result["pbrMetallicRoughness"] = _metallic_roughness(r0, 1.0, roughness)
+        if max(albedo) > 0.0:
+            notes.append("a metal of glTF has no diffuse colour: the albedo is left out of its material")
+    if material.albedo_texture.texture >= 0 or material.specular_texture.texture >= 0:
+        notes.append("the textures of the reflector's material are left out")
+    return result, notes
+
+
+def fresnel_description(fresnel: _core.Fresnel) -> dict[str, Any]:
+    """What a shader needs to compute the reflectance; the names are those of the scene file."""
+    name = fresnel.model.name
+    if fresnel.model == _core.FresnelModel.dielectric:
+        return {"model": name, "ior": list(fresnel.eta)}
+    if fresnel.model == _core.FresnelModel.conductor:
+        return {"model": name, "eta": list(fresnel.eta), "k": list(fresnel.k)}
+    return {"model": name, "r0": list(fresnel.r0)}
+
+
+def _metallic_roughness(colour: Sequence[float], metallic: float, roughness: float) -> dict[str, Any]:
+    return {
+        "baseColorFactor": [*(min(max(float(value), 0.0), 1.0) for value in colour), 1.0],
+        "metallicFactor": metallic,
+        "roughnessFactor": roughness,
+    }
+
+
+def _normal_reflectance(fresnel: _core.Fresnel) -> list[float]:
+    if fresnel.model == _core.FresnelModel.dielectric:
+        return [((n - 1.0) / (n + 1.0)) ** 2 for n in fresnel.eta]
+    if fresnel.model == _core.FresnelModel.conductor:
+        pairs = zip(fresnel.eta, fresnel.k, strict=True)
+        return [float(conductor(np.float64(1.0), eta, k)) for eta, k in pairs]
+    return list(fresnel.r0)
+
+
+def _perceptual_roughness(material: _core.Material) -> float:
+    """Roughness of glTF: it is the root of GGX's α; of a Phong lobe, α of the same width: √(2/(N + 2))."""
+    if material.lobe == _core.SpecularLobe.mirror:
+        return 0.0
+    if material.lobe == _core.SpecularLobe.phong:
+        return math.sqrt(math.sqrt(2.0 / (material.exponent + 2.0)))
+    return math.sqrt(material.roughness)

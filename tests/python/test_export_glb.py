@@ -1,0 +1,239 @@
+"""A PEM as a glTF file, read back by code that shares nothing with the writer."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from PIL import Image
+
+from mirrorbake import _core
+from mirrorbake.bake.bake import bake
+from mirrorbake.errors import InputError, OptionError
+from mirrorbake.pem.export.glb import export_glb
+from mirrorbake.pem.export.gltf_material import gltf_material
+from mirrorbake.pem.store import PemStore
+from mirrorbake.scene.build import BuiltScene, build_scene
+from mirrorbake.scene.load import parse_config
+from web_tools import node_folder
+
+ROOT = Path(__file__).parents[2]
+SCHEMA = json.loads((ROOT / "docs" / "reference" / "EXT_mirrorbake_pem.schema.json").read_text())
+SIZE = 16
+SMALL = {
+    "reflector": {"object": "teapot", "subdivisions": 4},
+    "material": {"albedo": 0.3, "fresnel": "dielectric", "ior": 1.6},
+    "views": {"count": 2, "degrees": 2.0, "size": [48, 48]},
+    "maps": {"size": SIZE},
+    "layers": {"diffuse": True, "local": True, "hull_split": True},
+    "trace": {"samples": 2, "indirect": "none"},
+}
+
+
+class Glb:
+    """A reader by the text of the specification."""
+
+    def __init__(self, data: bytes) -> None:
+        magic, version, length = struct.unpack_from("<4sII", data)
+        assert (magic, version, length) == (b"glTF", 2, len(data))
+        size, kind = struct.unpack_from("<I4s", data, 12)
+        assert kind == b"JSON"
+        self.json: dict[str, Any] = json.loads(data[20 : 20 + size])
+        binary, kind = struct.unpack_from("<I4s", data, 20 + size)
+        assert kind == b"BIN\0"
+        self.binary = data[28 + size : 28 + size + binary]
+
+    def view(self, number: int) -> bytes:
+        view = self.json["bufferViews"][number]
+        return self.binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+
+    def accessor(self, number: int) -> Any:
+        accessor = self.json["accessors"][number]
+        dtype = {5126: "<f4", 5125: "<u4"}[accessor["componentType"]]
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[accessor["type"]]
+        values = np.frombuffer(self.view(accessor["bufferView"]), dtype)
+        return values.reshape(accessor["count"], width)
+
+    def image(self, number: int) -> Any:
+        return np.asarray(Image.open(io.BytesIO(self.view(self.json["images"][number]["bufferView"]))))
+
+    @property
+    def extension(self) -> dict[str, Any]:
+        found: dict[str, Any] = self.json["extensions"]["EXT_mirrorbake_pem"]
+        return found
+
+    @property
+    def primitives(self) -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = self.json["meshes"][0]["primitives"]
+        return found
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory: pytest.TempPathFactory) -> tuple[PemStore, BuiltScene]:
+    directory = tmp_path_factory.mktemp("glb") / "pem"
+    config = parse_config(SMALL, "small")
+    bake(config, directory)
+    return PemStore.open(directory), build_scene(config)
+
+
+@pytest.fixture(scope="module")
+def path(baked: tuple[PemStore, BuiltScene], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("out") / "teapot.glb"
+    export_glb(*baked, out, samples=[1])
+    return out
+
+
+@pytest.fixture(scope="module")
+def glb(path: Path) -> Glb:
+    return Glb(path.read_bytes())
+
+
+def test_the_khronos_validator_finds_no_fault(path: Path) -> None:
+    folder = node_folder("tests/web")
+    done = subprocess.run(
+        ["node", "validate.cjs", path], cwd=folder, capture_output=True, text=True, check=True
+    )
+    issues = json.loads(done.stdout)
+    assert issues["numErrors"] == 0, issues["messages"]
+    assert issues["numWarnings"] == 0, issues["messages"]
+    # What it says of the rest: our extension and what only that uses, and images that are no power of two.
+    assert {m["code"] for m in issues["messages"]} <= {
+        "UNSUPPORTED_EXTENSION",
+        "UNUSED_OBJECT",
+        "IMAGE_NPOT_DIMENSIONS",
+    }
+
+
+def test_the_extension_is_as_its_schema_says(glb: Glb) -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    jsonschema.validate(glb.extension, SCHEMA)
+    for kind, objects in (("primitive", glb.primitives), ("material", glb.json["materials"])):
+        for item in objects:
+            part = {"$ref": f"#/$defs/{kind}", "$defs": SCHEMA["$defs"]}
+            jsonschema.validate(item["extensions"]["EXT_mirrorbake_pem"], part)
+    assert set(glb.json["extensionsUsed"]) == {"EXT_mirrorbake_pem", "KHR_materials_ior"}
+    assert "extensionsRequired" not in glb.json
+    broken = {**glb.extension, "sets": []}
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(broken, SCHEMA)
+
+
+def test_the_mesh_is_the_reflector(glb: Glb, baked: tuple[PemStore, BuiltScene]) -> None:
+    store, built = baked
+    mesh = built.scene.object_mesh(built.reflector)
+    attributes = glb.primitives[0]["attributes"]
+    np.testing.assert_array_equal(glb.accessor(attributes["POSITION"]), built.positions)
+    np.testing.assert_array_equal(glb.accessor(attributes["NORMAL"]), mesh.normals)
+    np.testing.assert_allclose(
+        glb.accessor(attributes["TEXCOORD_0"]), [[0, 1]] + mesh.uvs * [1, -1], atol=1e-7
+    )
+    np.testing.assert_array_equal(glb.accessor(attributes["_IRRADIANCE"]), store.read_irradiance())
+    local = store.read_local_triangles()
+    assert local is not None
+    for primitive in glb.primitives:
+        extension = primitive["extensions"]["EXT_mirrorbake_pem"]
+        triangles = glb.accessor(primitive["indices"]).reshape(-1, 3)
+        part = built.parts == extension["part"]
+        stacked = extension["stackIndices"] // 3
+        for written, expected in (
+            (triangles[:stacked], built.triangles[part & (local != 0)]),
+            (triangles[stacked:], built.triangles[part & (local == 0)]),
+        ):
+            assert len(written) > 0
+            np.testing.assert_array_equal(written, expected)
+
+
+def test_our_own_reader_takes_it_for_a_scene(path: Path, baked: tuple[PemStore, BuiltScene]) -> None:
+    built = baked[1]
+    loaded = _core.load_scene(str(path))
+    read = [np.asarray(loaded.scene.object_mesh(i).triangles) for i in range(len(loaded.scene.object_names))]
+    # It leaves out the triangles without area at the teapot's poles.
+    corners = built.positions[built.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert sum(len(triangles) for triangles in read) == np.count_nonzero(np.abs(normals).sum(axis=1))
+    material = loaded.scene.material(loaded.scene.object_material(0))
+    assert material.specular
+    np.testing.assert_allclose(material.albedo, 0.3, atol=1e-6)
+
+
+def read_level(glb: Glb, shell: dict[str, Any], level: int, image: str) -> Any:
+    """Faces of a level, by the text of docs/reference/ext-mirrorbake-pem.md."""
+    codes = glb.image(shell[image])
+    size, s = shell["size"], shell["size"] >> level
+    top = 0 if level == 0 else 2 * size
+    left = sum(3 * (size >> finer) for finer in range(1, level))
+    rows = [codes[top + r * s : top + r * s + s, left : left + 3 * s] for r in range(2)]
+    return np.stack([row[:, c * s : c * s + s] for row in rows for c in range(3)])
+
+
+def test_every_level_of_every_map_comes_back(glb: Glb, baked: tuple[PemStore, BuiltScene]) -> None:
+    store = baked[0]
+    code = glb.extension["radianceCode"]
+    static, sample = glb.extension["sets"]
+    assert static["name"] == "static"
+    assert "parameter" not in static
+    assert sample["parameter"] == 1.0
+    step = (code["high"] - code["low"]) / 255.0
+    for part in sample["parts"]:
+        assert [shell["name"] for shell in part["shells"]] == ["local", "distant"]
+        for shell in part["shells"]:
+            pyramid = store.read_map(part["name"], shell["name"], 1)
+            offset = 0
+            for level in range(SIZE.bit_length()):
+                count = 6 * (SIZE >> level) ** 2
+                expected = np.maximum(pyramid[offset : offset + count], 0.0)  # residuals may round below 0
+                offset += count
+                codes = read_level(glb, shell, level, "radiance").reshape(count, 3).astype(np.float64)
+                radiance = np.maximum(np.exp2(code["low"] + codes * step) - code["epsilon"], 0.0)
+                # Half a step of the code.
+                bound = (expected[:, :3] + code["epsilon"]) * (2.0 ** (0.5 * step) - 1.0)
+                assert (np.abs(radiance - expected[:, :3]) <= 1.001 * bound + 1e-6).all()
+                if "alpha" in shell:
+                    alpha = read_level(glb, shell, level, "alpha").reshape(count) / 255.0
+                    np.testing.assert_allclose(alpha, np.clip(expected[:, 3], 0, 1), atol=0.5 / 255 + 1e-6)
+        assert "alpha" not in part["shells"][-1]
+
+
+def test_the_static_map_of_all_parts_is_there_once(glb: Glb) -> None:
+    numbers = [part["shells"][0]["radiance"] for part in glb.extension["sets"][0]["parts"]]
+    assert len(numbers) == 2
+    assert len(set(numbers)) == 1
+
+
+def test_a_metal_is_a_metal_of_its_colour_and_glass_has_its_index() -> None:
+    schlick = _core.Fresnel(_core.FresnelModel.schlick, (0.9, 0.6, 0.3))
+    gold, _ = gltf_material(_core.Material(name="gold", specular=True, albedo=(0, 0, 0), fresnel=schlick))
+    assert gold["pbrMetallicRoughness"]["metallicFactor"] == 1.0
+    np.testing.assert_allclose(
+        gold["pbrMetallicRoughness"]["baseColorFactor"], [0.9, 0.6, 0.3, 1.0], rtol=1e-6
+    )
+    # Silver at 550 nm, n = 0.125, k = 3.34: ((n-1)² + k²) / ((n+1)² + k²).
+    silver = _core.Fresnel(_core.FresnelModel.conductor, eta=(0.125,) * 3, k=(3.34,) * 3)
+    metal, _ = gltf_material(_core.Material(name="silver", specular=True, fresnel=silver))
+    expected = (0.875**2 + 3.34**2) / (1.125**2 + 3.34**2)
+    np.testing.assert_allclose(metal["pbrMetallicRoughness"]["baseColorFactor"][:3], expected, rtol=1e-4)
+    glass = _core.Fresnel(_core.FresnelModel.dielectric, eta=(1.6,) * 3)
+    coat, _ = gltf_material(
+        _core.Material(name="glass", specular=True, albedo=(0.2, 0.3, 0.4), fresnel=glass)
+    )
+    assert coat["pbrMetallicRoughness"]["metallicFactor"] == 0.0
+    assert coat["extensions"]["KHR_materials_ior"]["ior"] == pytest.approx(1.6, rel=1e-6)
+    tinted = _core.Fresnel(_core.FresnelModel.schlick, (0.04, 0.02, 0.01))
+    coat, _ = gltf_material(_core.Material(name="tinted", specular=True, fresnel=tinted))
+    colour = coat["extensions"]["KHR_materials_specular"]["specularColorFactor"]
+    np.testing.assert_allclose(colour, [1.0, 0.5, 0.25], rtol=1e-5)
+
+
+def test_what_cannot_be_written_is_refused(baked: tuple[PemStore, BuiltScene], tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="sample = 2: expected 0 to 1"):
+        export_glb(*baked, tmp_path / "a.glb", samples=[2])
+    with pytest.raises(InputError, match="cannot write"):
+        export_glb(*baked, tmp_path / "missing" / "a.glb")
+    assert not list(tmp_path.iterdir())

@@ -178,8 +178,9 @@ def test_every_level_of_every_map_comes_back(glb: Glb, baked: tuple[PemStore, Bu
     code = glb.extension["radianceCode"]
     static, sample = glb.extension["sets"]
     assert static["name"] == "static"
-    assert "parameter" not in static
-    assert sample["parameter"] == 1.0
+    assert "point" not in static
+    assert sample["point"] == [1.0]
+    assert [axis["name"] for axis in glb.extension["axes"]] == ["arc"]
     step = (code["high"] - code["low"]) / 255.0
     for part in sample["parts"]:
         assert [shell["name"] for shell in part["shells"]] == ["local", "distant"]

@@ -82,7 +82,7 @@ def _export_maps(
     sample: int | None,
     all_samples: bool,
 ) -> None:
-    from mirrorbake.pem.export.map_sets import sample_set, static_set
+    from mirrorbake.pem.export.map_sets import axis_descriptions, sample_set, static_set
     from mirrorbake.pem.export.maps import DESCRIPTION_NAME, export_maps
     from mirrorbake.pem.store import PemStore
 
@@ -97,7 +97,15 @@ def _export_maps(
         if all_samples:
             yield from (sample_set(store, i) for i in range(len(store.header.space)))
 
-    export_maps(sets(), out, format=format, convention=convention, precision=precision, report=_print_message)
+    export_maps(
+        sets(),
+        out,
+        axes=axis_descriptions(store.header.space),
+        format=format,
+        convention=convention,
+        precision=precision,
+        report=_print_message,
+    )
     _print_message(f"wrote {out / DESCRIPTION_NAME} and the maps that it names")
 
 
@@ -113,7 +121,7 @@ def _export_glb(directory: Path, out: Path, sample: int | None, all_samples: boo
     store.require_complete()
     samples = [] if sample is None else [sample]
     if all_samples:
-        samples = list(range(len(store.header.parameters)))
+        samples = list(range(len(store.header.space)))
     built = build_scene(unchanged_config(store))
     export_glb(store, built, out, samples=samples, report=_print_message)
     _print_message(f"wrote {out}")

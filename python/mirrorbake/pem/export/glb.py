@@ -10,7 +10,7 @@ from mirrorbake import _core
 from mirrorbake.files import atomic_output, check_writable
 from mirrorbake.pem.export.glb_file import GlbFile
 from mirrorbake.pem.export.gltf_material import fresnel_description, gltf_material
-from mirrorbake.pem.export.map_sets import sample_set, static_set
+from mirrorbake.pem.export.map_sets import axis_descriptions, sample_set, static_set
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ def export_glb(
     extension = {
         "version": EXTENSION_VERSION,
         "footprintScale": store.header.source.config["infer"]["footprint_scale"],
+        "axes": axis_descriptions(store.header.space),
         "radianceCode": {"low": code.low, "high": code.high, "epsilon": code.epsilon},
         "sets": [_add_set(file, maps, code) for maps in sets()],
     }
@@ -89,6 +90,8 @@ def export_glb(
             "materials": [described],
         }
     )
+    if any(axis.name == "motion" for axis in store.header.space.axes):
+        notes.append("the reflector's motion is left out: its mesh is where it starts")
     data = file.to_bytes()
     with atomic_output(out) as temporary:
         temporary.write_bytes(data)
@@ -121,8 +124,8 @@ def _add_set(file: GlbFile, maps: MapSet, code: RadianceCode) -> dict[str, Any]:
                 written[id(shell)] = _add_shell(file, f"{maps.name} {part} {shell.name}", shell, code)
         parts.append({"name": part, "shells": [written[id(shell)] for shell in shells]})
     description: dict[str, Any] = {"name": maps.name, "parts": parts}
-    if maps.parameter is not None:
-        description["parameter"] = maps.parameter
+    if maps.point is not None:
+        description["point"] = list(maps.point)
     return description
 
 

@@ -11,7 +11,7 @@ from mirrorbake.errors import OptionError
 if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.store import PemStore
-    from mirrorbake.scene.parameters import Point
+    from mirrorbake.scene.parameters import ParameterSpace, Point
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,13 @@ class MapSet:
     """Where it was sampled; None for the static set."""
     parts: dict[str, list[ShellMap]]
     """Shells of every part, front to back."""
+
+
+def axis_descriptions(space: ParameterSpace) -> list[dict[str, Any]]:
+    """Axes of the parameter space, for the descriptions beside exported maps; `period` where it closes."""
+    return [
+        {key: value for key, value in axis.items() if value is not None} for axis in space.to_attributes()
+    ]
 
 
 def static_set(store: PemStore) -> MapSet:

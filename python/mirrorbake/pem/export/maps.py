@@ -14,7 +14,7 @@ from mirrorbake.files import write_text
 from mirrorbake.pem.export.frames import FRAMES, Frame, move_proxy, source_from_panorama, turn_cube
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from mirrorbake.pem.export.map_sets import MapSet, ShellMap
@@ -33,6 +33,7 @@ def export_maps(
     format: str = "ktx2",
     convention: str = "threejs",
     precision: str = "half",
+    axes: Sequence[Mapping[str, Any]] = (),
     report: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """Write sets of maps and a `maps.json` that says what they are.
@@ -52,6 +53,8 @@ def export_maps(
         A name of `FRAMES`: whose coordinates and orientation.
     precision
         Of the files. `float32` keeps the values of all levels exactly; `half` rounds them.
+    axes
+        Of the parameter space, for the description.
     report
         Called with a sentence for each thing to know, such as values that were clamped.
 
@@ -80,6 +83,7 @@ def export_maps(
         "lookup_from_space": (frame.lookup_matrix @ frame.space_matrix.T).tolist(),
         "radiance": "scene-linear, Rec.709 primaries; four channels: premultiplied by the fourth, alpha",
         "shells": "front to back: L = L0 + (1 - a0) (L1 + (1 - a1) (...))",
+        "axes": list(axes),
         "sets": [],
     }
     clamped = 0

@@ -47,13 +47,13 @@ class RadianceCode:
 
     def decode(self, codes: NDArray[np.uint8]) -> FloatArray:
         """Radiance that codes stand for, float32."""
-        radiance: FloatArray = self.table()[codes]
-        return radiance
+        return self.table()[codes]
 
     def table(self) -> FloatArray:
         """Radiance of each of the 256 codes, float32."""
         logarithm = self.low + np.arange(256) * ((self.high - self.low) / 255.0)
-        return np.maximum(np.exp2(logarithm) - self.epsilon, 0.0).astype(np.float32)
+        values: FloatArray = np.maximum(np.exp2(logarithm) - self.epsilon, 0.0).astype(np.float32)
+        return values
 
 
 def atlas_shape(size: int) -> tuple[int, int]:

@@ -14,7 +14,10 @@ COMMANDS = [
     *(f"mb-trace {command}" for command in ("beauty", "layers", "capture")),
     *(f"mb-envmap {command}" for command in ("info", "convert", "mips", "border", "sample", "compare")),
     *(f"mb-fresnel {command}" for command in ("table", "plot", "metal", "report")),
-    *(f"mirrorbake {command}" for command in ("bake", "analyze", "evaluate", "render", "export", "demo")),
+    *(
+        f"mirrorbake {command}"
+        for command in ("bake", "analyze", "evaluate", "report", "render", "export", "demo")
+    ),
     *("mirrorbake study fresnel", "mirrorbake study proxy"),
 ]
 

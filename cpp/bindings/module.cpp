@@ -14,6 +14,7 @@ void bind_tracer(nb::module_& m);
 void bind_projection(nb::module_& m);
 void bind_inference(nb::module_& m);
 void bind_pem(nb::module_& m);
+void bind_prefilter(nb::module_& m);
 void bind_shading(nb::module_& m);
 
 }  // namespace mirrorbake::bindings
@@ -32,5 +33,6 @@ NB_MODULE(_core, m) {
   bind_envmap(m);
   bind_inference(m);
   bind_pem(m);
+  bind_prefilter(m);
   bind_shading(m);
 }

@@ -1,0 +1,122 @@
+#include "lobe_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mirrorbake/core/isa.hpp"
+
+namespace mirrorbake {
+namespace {
+
+// Nodes as wide as this share of the scale on which the lobe changes: with both moments that they carry, what is
+// left out is of the fourth order for light that is spread evenly, and 1e-4 of the peak at most for a sun.
+constexpr double kShare = 0.35;
+constexpr double kNegligible = 1e-9;
+constexpr std::size_t kTableSteps = 8192;
+
+double angle_of(double chord) { return 2.0 * std::asin(std::min(1.0, 0.5 * chord)); }
+
+double phong_cut(double exponent) {
+  const double cosine = std::pow(kNegligible, 1.0 / exponent);
+  return std::sqrt(2.0 * (1.0 - cosine));
+}
+
+void plan_table(const Lobe& lobe, LobePlan& plan) {
+  plan.table.resize(4 * (kTableSteps + 1));
+  double peak = 0.0;
+  for (std::size_t i = 0; i <= kTableSteps; ++i) {
+    const LobeDerivatives d = lobe_derivatives(lobe, static_cast<double>(i) / kTableSteps);
+    plan.table[4 * i] = static_cast<float>(d.weight);
+    plan.table[4 * i + 1] = static_cast<float>(d.first);
+    plan.table[4 * i + 2] = static_cast<float>(d.second);
+    peak = std::max(peak, d.weight);
+  }
+  plan.terms = {LobeForm::table,       1.0F, 1.0F, plan.table.data(), static_cast<float>(kTableSteps),
+                static_cast<int>(kTableSteps) - 1};
+  plan.cut = 2.0 * std::sin(0.5 * lobe.table_angle * std::numbers::pi / 180.0);
+  // The lobe changes on the scale √(weight / |second derivative by γ|); where it is small, on that of its peak.
+  std::array<double, LobePlan::kSteps + 1> scale{};
+  double first_moment = 0.0;
+  double mass = 0.0;
+  for (std::size_t i = 0; i <= LobePlan::kSteps; ++i) {
+    double least = 1.0;
+    for (int k = 0; k < 8; ++k) {
+      const double s = std::min(1.0, (static_cast<double>(i) + k / 8.0) / LobePlan::kSteps);
+      const LobeDerivatives d = lobe_derivatives(lobe, s);
+      const double sine = 2.0 * s * std::sqrt(1.0 - s * s);
+      const double bend = std::abs(d.second * sine * sine - d.first * (1.0 - 2.0 * s * s));
+      least = std::min(least, std::sqrt(std::max(d.weight, 1e-3 * peak) / std::max(bend, 1e-30)));
+      first_moment += d.weight * s * s * s;
+      mass += d.weight * s;
+    }
+    scale[i] = std::max(least, 0.004);
+  }
+  plan.width = std::max(0.004, std::sqrt(2.0 * first_moment / mass));
+  for (std::size_t i = 0; i <= LobePlan::kSteps; ++i) {
+    // A node beyond `i` may begin up to its own width before it.
+    double least = scale[i];
+    for (std::size_t k = i > 4 ? i - 4 : 0; k <= std::min(LobePlan::kSteps, i + 4); ++k) {
+      least = std::min(least, scale[k]);
+    }
+    plan.allowed[i] = static_cast<float>(kShare * least);
+  }
+}
+
+}  // namespace
+
+double LobePlan::finest() const {
+  float least = allowed[0];
+  for (std::size_t i = 0; i <= kSteps && 2.0 * static_cast<double>(i) / kSteps <= cut; ++i) {
+    least = std::min(least, allowed[i]);
+  }
+  return static_cast<double>(least);
+}
+
+void make_plan(const Lobe& lobe, LobePlan& plan) {
+  plan = {};
+  switch (lobe.kind) {
+    case LobeKind::lambert:
+      plan.cut = std::numbers::sqrt2;
+      plan.has_horizon = true;
+      plan.allowed.fill(static_cast<float>(kShare));
+      plan.terms = {LobeForm::phong, 1.0F};
+      return;
+    case LobeKind::phong:
+      plan.width = 1.0 / std::sqrt(lobe.exponent);
+      plan.cut = phong_cut(lobe.exponent);
+      plan.has_horizon = lobe.exponent < 6.0;
+      plan.allowed.fill(static_cast<float>(kShare * plan.width));
+      plan.terms = {LobeForm::phong, static_cast<float>(lobe.exponent)};
+      return;
+    case LobeKind::ggx: {
+      // The weight falls like (1 + (γ/2α)²)⁻²: on the scale 2α at the peak, and half the angle far from it.
+      const double core = 2.0 * lobe.alpha;
+      plan.width = core / 1.5;
+      plan.cut = std::numbers::sqrt2;
+      plan.has_horizon = lobe.alpha > 0.15;
+      for (std::size_t i = 0; i <= LobePlan::kSteps; ++i) {
+        const double angle = angle_of(2.0 * static_cast<double>(i) / LobePlan::kSteps);
+        plan.allowed[i] =
+            static_cast<float>(std::min(kShare, 0.5 * kShare * std::sqrt(core * core + angle * angle)));
+      }
+      plan.terms = {LobeForm::ggx, 1.0F, static_cast<float>(lobe.alpha * lobe.alpha)};
+      return;
+    }
+    case LobeKind::table: plan_table(lobe, plan); return;
+  }
+}
+
+AccumulateLoop accumulate_loop() {
+#ifdef MIRRORBAKE_HAS_X86_LEVELS
+  switch (active_isa()) {
+    case Isa::avx512: return avx512::kAccumulate;
+    case Isa::avx2: return avx2::kAccumulate;
+    case Isa::sse42: return sse42::kAccumulate;
+    case Isa::baseline: break;
+  }
+#endif
+  return baseline::kAccumulate;
+}
+
+}  // namespace mirrorbake

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "lobe_kernels.hpp"
+#include "mirrorbake/prefilter/lobe.hpp"
+
+/// How finely the source has to be looked at for a lobe, by the chord 2 sin(γ/2) from its axis.
+namespace mirrorbake {
+
+struct LobePlan {
+  static constexpr std::size_t kSteps = 512;  ///< of the chord from 0 to 2
+
+  double width = 1.0;                         ///< σ of the Gaussian that the peak looks like, in radians
+  double cut = 2.0;                           ///< chord beyond which weights are below 1e-9 of the peak
+  bool has_horizon = false;                   ///< the weight has a corner at cos γ = 0 that can be seen
+  std::array<float, kSteps + 1> allowed = {};  ///< widest node, in radians, no closer than the chord
+  std::vector<float> table = {};
+  LobeTerms terms = {};
+
+  double allowed_at(double chord) const {
+    const double position = chord * (0.5 * kSteps);
+    return static_cast<double>(
+        allowed[position > 0.0
+                    ? (position < kSteps ? static_cast<std::size_t>(position) : std::size_t{kSteps})
+                    : std::size_t{0}]);
+  }
+  double finest() const;
+};
+
+/// `plan.terms.table` points into `plan.table`: the plan must not be copied.
+void make_plan(const Lobe& lobe, LobePlan& plan);
+
+}  // namespace mirrorbake

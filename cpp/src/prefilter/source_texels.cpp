@@ -1,0 +1,71 @@
+#include "source_texels.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace mirrorbake {
+namespace {
+
+// Pieces of all faces together, and along a side of one.
+constexpr double kMostPieces = 3.4e7;
+constexpr int kMostAcross = 65536;
+
+}  // namespace
+
+SourceTexels::SourceTexels(const EnvMapLayout& layout, int parts)
+    : projection_(layout.projection),
+      parts_(parts),
+      width_(layout.width * parts),
+      height_(layout.height * parts),
+      is_latlong_(layout.projection.kind == ProjectionKind::latlong) {
+  if (!is_latlong_) {
+    angles_ = texel_solid_angles(projection_, width_, height_);
+    return;
+  }
+  angles_.resize(static_cast<std::size_t>(height_));
+  for (int row = 0; row < height_; ++row) {
+    angles_[static_cast<std::size_t>(row)] = texel_solid_angle(projection_, width_, height_, 0, row);
+  }
+  const auto add = [&](double angle) {
+    sines_.push_back(std::sin(angle));
+    cosines_.push_back(std::cos(angle));
+  };
+  for (int column = 0; column < width_; ++column) add(std::numbers::pi * column_center(column, width_));
+  for (int row = 0; row < height_; ++row) add(0.5 * std::numbers::pi * row_center(row, height_));
+}
+
+glm::dvec3 SourceTexels::direction(int face, int row, int column) const {
+  if (!is_latlong_) {
+    return direction_from_point(projection_, face, column_center(column, width_), row_center(row, height_));
+  }
+  const std::size_t longitude = static_cast<std::size_t>(column);
+  const std::size_t latitude = static_cast<std::size_t>(width_) + static_cast<std::size_t>(row);
+  return {cosines_[latitude] * sines_[longitude], sines_[latitude], -cosines_[latitude] * cosines_[longitude]};
+}
+
+double texel_width(const EnvMapLayout& layout) {
+  const double pi = std::numbers::pi;
+  switch (layout.projection.kind) {
+    case ProjectionKind::latlong: return std::max(2.0 * pi / layout.width, pi / layout.height);
+    case ProjectionKind::cube: return 2.0 / layout.width;
+    case ProjectionKind::dual_paraboloid:
+    case ProjectionKind::sphere_map: return 4.0 / std::min(layout.width, layout.height);
+    case ProjectionKind::angular: return 2.0 * pi / std::min(layout.width, layout.height);
+    case ProjectionKind::fisheye:
+      return static_cast<double>(layout.projection.field_of_view) * (pi / 180.0) /
+             std::min(layout.width, layout.height);
+  }
+  return 1.0;
+}
+
+int parts_for_width(const EnvMapLayout& layout, double sigma) {
+  const double wanted = 0.8 * texel_width(layout) / sigma;
+  if (wanted <= 1.0) return 1;
+  const double across = std::max(layout.width, layout.height);
+  const double texels = static_cast<double>(layout.level_texels(0));
+  const double most = std::max(1.0, std::min(std::sqrt(kMostPieces / texels), kMostAcross / across));
+  return static_cast<int>(std::min(std::ceil(wanted), std::floor(most)));
+}
+
+}  // namespace mirrorbake

@@ -11,7 +11,9 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 #include "mirrorbake/prefilter/convolve.hpp"
+#include "mirrorbake/prefilter/harmonics.hpp"
 #include "mirrorbake/prefilter/lobe.hpp"
+#include "mirrorbake/prefilter/split_sum.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -56,6 +58,25 @@ RoughnessScale roughness_named(const std::string& name) {
   if (name == "squared") return RoughnessScale::squared;
   if (name == "linear") return RoughnessScale::linear;
   throw InvalidArgument("roughness", name, "squared or linear");
+}
+
+using DoubleMatrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+// Coefficients (n, channels), n a square.
+Harmonics harmonics_of(const DoubleMatrix& coefficients) {
+  int order = 0;
+  while (static_cast<std::size_t>((order + 1) * (order + 1)) < coefficients.shape(0)) ++order;
+  Harmonics harmonics{order,
+                      static_cast<int>(coefficients.shape(1)),
+                      {coefficients.data(), coefficients.data() + coefficients.size()}};
+  validate(harmonics);
+  return harmonics;
+}
+
+nb::ndarray<nb::numpy, double> rows_of(std::vector<double>&& values, int channels) {
+  const std::size_t columns = static_cast<std::size_t>(channels);
+  const std::size_t rows = values.size() / columns;
+  return to_numpy(std::move(values), {rows, columns});
 }
 
 nb::ndarray<nb::numpy, float> block(std::vector<float>&& values) {
@@ -112,8 +133,7 @@ void bind_prefilter(nb::module_& m) {
             {
               nb::gil_scoped_release released;
               self.convolver.apply(
-                  lobe,
-                  {reinterpret_cast<const glm::vec3*>(directions.data()), directions.shape(0)},
+                  lobe, {reinterpret_cast<const glm::vec3*>(directions.data()), directions.shape(0)},
                   lobe_scale, values);
             }
             return to_numpy(std::move(values), {directions.shape(0), channels});
@@ -144,10 +164,76 @@ void bind_prefilter(nb::module_& m) {
               "roughness: str, progress: collections.abc.Callable[[int, int], None] | None = None) -> "
               "tuple[EnvMapLayout, NDArray[numpy.float32]]"),
       "A cube whose levels are prefiltered with GGX of rising alpha.");
-  m.def("chain_alpha", [](int level, int levels, const std::string& roughness) {
-          return chain_alpha(level, levels, roughness_named(roughness));
-        },
-        nb::arg("level"), nb::arg("levels"), nb::arg("roughness"), "Alpha of a level of a chain.");
+  m.def(
+      "chain_alpha",
+      [](int level, int levels, const std::string& roughness) {
+        return chain_alpha(level, levels, roughness_named(roughness));
+      },
+      nb::arg("level"), nb::arg("levels"), nb::arg("roughness"), "Alpha of a level of a chain.");
+
+  m.def(
+      "project_harmonics",
+      [](const EnvMapLayout& layout, FloatArray values, int order) {
+        Harmonics harmonics;
+        {
+          nb::gil_scoped_release released;
+          harmonics = project_harmonics({layout, {values.data(), values.size()}}, order);
+        }
+        return rows_of(std::move(harmonics.coefficients), harmonics.channels);
+      },
+      nb::arg("layout"), nb::arg("values"), nb::arg("order"),
+      "Coefficients ((order + 1)^2, channels) of the finest level.");
+  m.def("lambert_factor", &lambert_factor, nb::arg("band"), "What a cosine lobe multiplies a band by.");
+  m.def(
+      "lambert_harmonics",
+      [](DoubleMatrix radiance) {
+        Harmonics harmonics = lambert_harmonics(harmonics_of(radiance));
+        return rows_of(std::move(harmonics.coefficients), harmonics.channels);
+      },
+      nb::arg("radiance"), "Coefficients of irradiance from those of radiance.");
+  m.def(
+      "window_harmonics",
+      [](DoubleMatrix coefficients, const std::string& window) {
+        Harmonics harmonics = windowed(harmonics_of(coefficients), parse_harmonic_window(window));
+        return rows_of(std::move(harmonics.coefficients), harmonics.channels);
+      },
+      nb::arg("coefficients"), nb::arg("window"), "Coefficients damped against ringing.");
+  m.def(
+      "evaluate_harmonics",
+      [](DoubleMatrix coefficients, const std::string& projection, int width, int height, bool clamp) {
+        EnvMap map =
+            evaluate_harmonics(harmonics_of(coefficients), {parse_projection(projection), width, height},
+                               clamp ? NegativeLight::clamp : NegativeLight::keep);
+        return nb::make_tuple(map.layout, block(std::move(map.values)));
+      },
+      nb::arg("coefficients"), nb::arg("projection"), nb::arg("width"), nb::arg("height"), nb::arg("clamp"),
+      nb::sig("def evaluate_harmonics(coefficients: NDArray[numpy.float64], projection: str, width: int, "
+              "height: int, clamp: bool) -> tuple[EnvMapLayout, NDArray[numpy.float32]]"),
+      "Layout and values of the map of the sums.");
+  m.def(
+      "harmonic_constants",
+      [](DoubleMatrix radiance) {
+        const Harmonics harmonics = harmonics_of(radiance);
+        return rows_of(shader_constants(harmonics), harmonics.channels);
+      },
+      nb::arg("radiance"), "Nine constants (9, channels) of E/pi for a shader, in Filament's order.");
+  m.def(
+      "split_sum",
+      [](double cosine, double alpha) {
+        const SplitSum sum = split_sum(cosine, alpha);
+        return nb::make_tuple(sum.scale, sum.bias);
+      },
+      nb::arg("cosine"), nb::arg("alpha"),
+      nb::sig("def split_sum(cosine: float, alpha: float) -> tuple[float, float]"),
+      "Scale and bias of the reflectance at normal incidence.");
+  m.def(
+      "split_sum_table",
+      [](int size, const std::string& roughness) {
+        std::vector<float> table = split_sum_table(size, roughness_named(roughness));
+        const std::size_t n = static_cast<std::size_t>(size);
+        return to_numpy(std::move(table), {n, n, 3});
+      },
+      nb::arg("size"), nb::arg("roughness"), "Scale, bias and their sum (roughness, n.v, 3).");
 }
 
 }  // namespace mirrorbake::bindings

@@ -1,6 +1,6 @@
 """Compiled part of mirrorbake. Use it through the package `mirrorbake`."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import enum
 from typing import Annotated, overload
 
@@ -1634,6 +1634,76 @@ def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArra
     """
     Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex (V, 3).
     """
+
+class Lobe:
+    """A radially symmetric lobe of weights."""
+
+    def __init__(self, kind: str, parameter: float = 1.0, table: Sequence[float] = []) -> None:
+        """
+        lambert; phong (exponent); ggx (alpha); table (largest angle in degrees, weights at equal steps).
+        """
+
+    def weight(self, cosine: float) -> float:
+        """Weight at an angle with this cosine."""
+
+    @property
+    def integral(self) -> float:
+        """Integral of the weight over the sphere, steradians."""
+
+    @property
+    def is_mirror(self) -> bool:
+        """Whether it is a single direction."""
+
+def alpha_from_exponent(exponent: float) -> float:
+    """Alpha of the microfacets whose highlight is as wide as Phong's."""
+
+def exponent_from_alpha(alpha: float) -> float:
+    """
+    Phong's exponent whose highlight is as wide as that of the microfacets.
+    """
+
+class Convolver:
+    """Convolves one map with any number of lobes."""
+
+    def __init__(self, layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> None: ...
+
+    def apply(self, lobe: Lobe, projection: str, width: int, height: int, scale: str) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
+        """Layout and values of the map, by the direction of the lobe's axis."""
+
+    def sample(self, lobe: Lobe, directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], scale: str, channels: int) -> NDArray[numpy.float32]:
+        """Values (n, channels) for lobes about unit directions (n, 3)."""
+
+def ggx_chain(layout: EnvMapLayout, values: NDArray[numpy.float32], size: int, levels: int, roughness: str, progress: Callable[[int, int], None] | None = None) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
+    """A cube whose levels are prefiltered with GGX of rising alpha."""
+
+def chain_alpha(level: int, levels: int, roughness: str) -> float:
+    """Alpha of a level of a chain."""
+
+def project_harmonics(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], order: int) -> NDArray[numpy.float64]:
+    """Coefficients ((order + 1)^2, channels) of the finest level."""
+
+def lambert_factor(band: int) -> float:
+    """What a cosine lobe multiplies a band by."""
+
+def lambert_harmonics(radiance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float64]:
+    """Coefficients of irradiance from those of radiance."""
+
+def window_harmonics(coefficients: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], window: str) -> NDArray[numpy.float64]:
+    """Coefficients damped against ringing."""
+
+def evaluate_harmonics(coefficients: NDArray[numpy.float64], projection: str, width: int, height: int, clamp: bool) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
+    """Layout and values of the map of the sums."""
+
+def harmonic_constants(radiance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float64]:
+    """
+    Nine constants (9, channels) of E/pi for a shader, in Filament's order.
+    """
+
+def split_sum(cosine: float, alpha: float) -> tuple[float, float]:
+    """Scale and bias of the reflectance at normal incidence."""
+
+def split_sum_table(size: int, roughness: str) -> NDArray[numpy.float32]:
+    """Scale, bias and their sum (roughness, n.v, 3)."""
 
 @overload
 def fresnel_schlick(c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], r0: float, f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...

@@ -329,7 +329,7 @@ class Resampler:
         return self._resampler.bytes
 
 
-def _height_and_width(projection: str, size: int | tuple[int, int]) -> tuple[int, int]:
+def height_and_width(projection: str, size: int | tuple[int, int]) -> tuple[int, int]:
     try:
         if isinstance(size, tuple | list):
             height, width = (index(side) for side in size)
@@ -351,7 +351,7 @@ def _resampler(
     source_from_target: ArrayLike | None,
     max_bytes: int,
 ) -> _core.Resampler:
-    height, width = _height_and_width(projection, size)
+    height, width = height_and_width(projection, size)
     matrix = np.eye(3, dtype=np.float32) if source_from_target is None else source_from_target
     matrix = np.ascontiguousarray(real_array("source_from_target", matrix, np.float32))
     if matrix.shape != (3, 3):

@@ -43,11 +43,11 @@ struct Tile {
 
 struct Convolver::State {
   EnvMapView map;
-  std::map<int, SourceTexels> texels;            ///< by parts
+  std::map<int, SourceTexels> texels;               ///< by parts
   std::map<std::pair<int, int>, MomentGrid> grids;  ///< by cells and parts, of the current channels
-  std::map<int, TexelBlocks> blocks;             ///< by parts
-  int group = -1;                                ///< first channel of the grids
-  std::map<int, int> moments;                    ///< first channel of the moments of the blocks, by parts
+  std::map<int, TexelBlocks> blocks;                ///< by parts
+  int group = -1;                                   ///< first channel of the grids
+  std::map<int, int> moments;                       ///< first channel of the moments of the blocks, by parts
 
   const SourceTexels& texels_of(int parts) {
     return texels.try_emplace(parts, map.layout, parts).first->second;
@@ -60,11 +60,9 @@ struct Convolver::State {
     if (group != first_channel) grids.clear();
     group = first_channel;
     for (const auto& [key, grid] : grids) {
-      if (key.first >= cells && key.second >= parts) return grid;
+      if (key.first >= cells && key.second == parts) return grid;
     }
-    return grids
-        .try_emplace({cells, parts}, map, first_channel, texels_of(parts), cells)
-        .first->second;
+    return grids.try_emplace({cells, parts}, map, first_channel, texels_of(parts), cells).first->second;
   }
 
   void store(std::span<float> values, std::size_t output, int first_channel, const double* sums,
@@ -163,7 +161,8 @@ void Convolver::State::narrow(const Lobe& lobe, const LobePlan& plan, std::span<
           const std::size_t at = map.layout.index(0, p.face, texel_index(-p.y, map.layout.height),
                                                   texel_index(p.x, map.layout.width));
           for (std::size_t c = 0; c < used; ++c) {
-            sums[c] = integral * static_cast<double>(map.values[at + static_cast<std::size_t>(first_channel) + c]);
+            sums[c] =
+                integral * static_cast<double>(map.values[at + static_cast<std::size_t>(first_channel) + c]);
           }
           sums[3] = integral;
         }
@@ -176,8 +175,8 @@ void Convolver::State::narrow(const Lobe& lobe, const LobePlan& plan, std::span<
 void Convolver::State::wide(const LobePlan& plan, std::span<const glm::vec3> directions,
                             const std::vector<Tile>& tiles, int first_channel, LobeScale scale,
                             std::span<float> values) {
-  const MomentGrid& grid =
-      grid_of(first_channel, MomentGrid::cells_for(plan.finest()), parts_for_width(map.layout, plan.width));
+  const int cells = MomentGrid::cells_for(plan.finest());
+  const MomentGrid& grid = grid_of(first_channel, cells, parts_for_width(map.layout, plan.width));
   const AccumulateLoop accumulate = accumulate_loop();
   parallel_for(tiles.size(), 4, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> list;
@@ -202,7 +201,7 @@ void Convolver::State::wide(const LobePlan& plan, std::span<const glm::vec3> dir
       const std::array<float, 3> center{static_cast<float>(middle.x), static_cast<float>(middle.y),
                                         static_cast<float>(middle.z)};
       list.clear();
-      grid.find(plan, center.data(), radius + 1e-6, list);
+      grid.find(plan, cells, center.data(), radius + 1e-6, list);
       std::array<double, 4 * kOutputs> sums{};
       accumulate(grid.nodes(), list.data(), list.size(), x.data(), y.data(), z.data(), plan.terms,
                  sums.data());
@@ -261,10 +260,10 @@ EnvMap Convolver::apply(const Lobe& lobe, const PrefilterTarget& target, LobeSca
   std::vector<glm::vec3> directions(layout.level_texels(0));
   parallel_for(directions.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      directions[i] = glm::vec3(direction_from_point(
-          target.projection, static_cast<int>(i / (width * height)),
-          column_center(static_cast<int>(i % width), target.width),
-          row_center(static_cast<int>(i / width % height), target.height)));
+      directions[i] =
+          glm::vec3(direction_from_point(target.projection, static_cast<int>(i / (width * height)),
+                                         column_center(static_cast<int>(i % width), target.width),
+                                         row_center(static_cast<int>(i / width % height), target.height)));
     }
   });
   std::vector<Tile> tiles;
@@ -288,8 +287,10 @@ EnvMap Convolver::apply(const Lobe& lobe, const PrefilterTarget& target, LobeSca
 void Convolver::apply(const Lobe& lobe, std::span<const glm::vec3> directions, LobeScale scale,
                       std::span<float> values) {
   validate(lobe);
-  if (is_mirror(lobe)) throw InvalidArgument("lobe", "a mirror", "a lobe of some width for single directions");
-  check_length("values", values.size(), directions.size() * static_cast<std::size_t>(state_->map.layout.channels),
+  if (is_mirror(lobe))
+    throw InvalidArgument("lobe", "a mirror", "a lobe of some width for single directions");
+  check_length("values", values.size(),
+               directions.size() * static_cast<std::size_t>(state_->map.layout.channels),
                "directions × channels");
   std::vector<Tile> tiles(directions.size());
   std::vector<glm::vec3> unit(directions.size());

@@ -202,13 +202,15 @@ EnvMap evaluate_harmonics(const Harmonics& h, const PrefilterTarget& target, Neg
   parallel_for(result.layout.level_texels(0), 1024, [&](std::size_t begin, std::size_t end) {
     std::array<double, kMost> basis{};
     for (std::size_t texel = begin; texel < end; ++texel) {
-      harmonic_basis(direction_from_point(target.projection, static_cast<int>(texel / (width * height)),
-                                          column_center(static_cast<int>(texel % width), target.width),
-                                          row_center(static_cast<int>(texel / width % height), target.height)),
-                     h.order, basis);
+      harmonic_basis(
+          direction_from_point(target.projection, static_cast<int>(texel / (width * height)),
+                               column_center(static_cast<int>(texel % width), target.width),
+                               row_center(static_cast<int>(texel / width % height), target.height)),
+          h.order, basis);
       for (std::size_t c = 0; c < channels; ++c) {
         double value = 0.0;
-        for (std::size_t i = 0; i < basis_size(h.order); ++i) value += h.coefficients[i * channels + c] * basis[i];
+        for (std::size_t i = 0; i < basis_size(h.order); ++i)
+          value += h.coefficients[i * channels + c] * basis[i];
         if (negative == NegativeLight::clamp) value = std::max(value, 0.0);
         result.values[texel * channels + c] = static_cast<float>(value);
       }
@@ -223,9 +225,14 @@ std::vector<double> shader_constants(const Harmonics& radiance) {
   // The factors before the polynomials of [AEM] eq. 9.
   const double linear = std::sqrt(3.0 / (4.0 * kPi));
   const double product = std::sqrt(15.0 / (4.0 * kPi));
-  const std::array<double, 9> factors{std::sqrt(0.25 / kPi), linear,  linear,
-                                      linear,                product, product,
-                                      std::sqrt(5.0 / (16.0 * kPi)), product,
+  const std::array<double, 9> factors{std::sqrt(0.25 / kPi),
+                                      linear,
+                                      linear,
+                                      linear,
+                                      product,
+                                      product,
+                                      std::sqrt(5.0 / (16.0 * kPi)),
+                                      product,
                                       std::sqrt(15.0 / (16.0 * kPi))};
   const std::size_t channels = static_cast<std::size_t>(radiance.channels);
   std::vector<double> constants(9 * channels);

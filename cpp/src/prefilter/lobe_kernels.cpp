@@ -22,10 +22,8 @@ inline float exp2_of(float x) {
   const std::int32_t whole = static_cast<std::int32_t>(y - 0.5F);
   const float f = (y - static_cast<float>(whole)) * 0.6931471805599453F;
   const float series =
-      1.0F +
-      f * (1.0F +
-           f * (0.5F +
-                f * (1.0F / 6.0F + f * (1.0F / 24.0F + f * (1.0F / 120.0F + f * (1.0F / 720.0F))))));
+      1.0F + f * (1.0F + f * (0.5F + f * (1.0F / 6.0F +
+                                          f * (1.0F / 24.0F + f * (1.0F / 120.0F + f * (1.0F / 720.0F))))));
   return series * __builtin_bit_cast(float, (whole + 127) * (1 << 23));
 }
 

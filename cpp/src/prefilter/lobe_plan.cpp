@@ -12,13 +12,18 @@ namespace {
 // Nodes as wide as this share of the scale on which the lobe changes: with both moments that they carry, what is
 // left out is of the fourth order for light that is spread evenly, and 1e-4 of the peak at most for a sun.
 constexpr double kShare = 0.35;
-constexpr double kNegligible = 1e-9;
+constexpr double kPhongShare = 0.45;  // whose derivatives fall off as fast as the lobe
+constexpr double kWidest = 0.2;       // radians, of lobes that are as wide as a hemisphere
+// Weights are left out below this share of the lobe's integral: a sun of 1e5 times the surroundings, 6e-5 sr wide, adds
+// less than 3e-5 of what they add.
+constexpr double kNegligible = 4e-6;
 constexpr std::size_t kTableSteps = 8192;
 
 double angle_of(double chord) { return 2.0 * std::asin(std::min(1.0, 0.5 * chord)); }
 
 double phong_cut(double exponent) {
-  const double cosine = std::pow(kNegligible, 1.0 / exponent);
+  const double weight = kNegligible * 2.0 * std::numbers::pi / (exponent + 1.0);
+  const double cosine = std::pow(weight, 1.0 / exponent);
   return std::sqrt(2.0 * (1.0 - cosine));
 }
 
@@ -32,7 +37,11 @@ void plan_table(const Lobe& lobe, LobePlan& plan) {
     plan.table[4 * i + 2] = static_cast<float>(d.second);
     peak = std::max(peak, d.weight);
   }
-  plan.terms = {LobeForm::table,       1.0F, 1.0F, plan.table.data(), static_cast<float>(kTableSteps),
+  plan.terms = {LobeForm::table,
+                1.0F,
+                1.0F,
+                plan.table.data(),
+                static_cast<float>(kTableSteps),
                 static_cast<int>(kTableSteps) - 1};
   plan.cut = 2.0 * std::sin(0.5 * lobe.table_angle * std::numbers::pi / 180.0);
   // The lobe changes on the scale √(weight / |second derivative by γ|); where it is small, on that of its peak.
@@ -59,7 +68,7 @@ void plan_table(const Lobe& lobe, LobePlan& plan) {
     for (std::size_t k = i > 4 ? i - 4 : 0; k <= std::min(LobePlan::kSteps, i + 4); ++k) {
       least = std::min(least, scale[k]);
     }
-    plan.allowed[i] = static_cast<float>(kShare * least);
+    plan.allowed[i] = static_cast<float>(std::min(kWidest, kShare * least));
   }
 }
 
@@ -79,14 +88,14 @@ void make_plan(const Lobe& lobe, LobePlan& plan) {
     case LobeKind::lambert:
       plan.cut = std::numbers::sqrt2;
       plan.has_horizon = true;
-      plan.allowed.fill(static_cast<float>(kShare));
+      plan.allowed.fill(static_cast<float>(kWidest));
       plan.terms = {LobeForm::phong, 1.0F};
       return;
     case LobeKind::phong:
       plan.width = 1.0 / std::sqrt(lobe.exponent);
       plan.cut = phong_cut(lobe.exponent);
       plan.has_horizon = lobe.exponent < 6.0;
-      plan.allowed.fill(static_cast<float>(kShare * plan.width));
+      plan.allowed.fill(static_cast<float>(std::min(kWidest, kPhongShare * plan.width)));
       plan.terms = {LobeForm::phong, static_cast<float>(lobe.exponent)};
       return;
     case LobeKind::ggx: {
@@ -98,7 +107,7 @@ void make_plan(const Lobe& lobe, LobePlan& plan) {
       for (std::size_t i = 0; i <= LobePlan::kSteps; ++i) {
         const double angle = angle_of(2.0 * static_cast<double>(i) / LobePlan::kSteps);
         plan.allowed[i] =
-            static_cast<float>(std::min(kShare, 0.5 * kShare * std::sqrt(core * core + angle * angle)));
+            static_cast<float>(std::min(kWidest, 0.5 * kShare * std::sqrt(core * core + angle * angle)));
       }
       plan.terms = {LobeForm::ggx, 1.0F, static_cast<float>(lobe.alpha * lobe.alpha)};
       return;

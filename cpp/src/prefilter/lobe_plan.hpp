@@ -13,9 +13,9 @@ namespace mirrorbake {
 struct LobePlan {
   static constexpr std::size_t kSteps = 512;  ///< of the chord from 0 to 2
 
-  double width = 1.0;                         ///< σ of the Gaussian that the peak looks like, in radians
-  double cut = 2.0;                           ///< chord beyond which weights are below 1e-9 of the peak
-  bool has_horizon = false;                   ///< the weight has a corner at cos γ = 0 that can be seen
+  double width = 1.0;                          ///< σ of the Gaussian that the peak looks like, in radians
+  double cut = 2.0;                            ///< chord beyond which weights count for nothing
+  bool has_horizon = false;                    ///< the weight has a corner at cos γ = 0 that can be seen
   std::array<float, kSteps + 1> allowed = {};  ///< widest node, in radians, no closer than the chord
   std::vector<float> table = {};
   LobeTerms terms = {};

@@ -78,8 +78,8 @@ double cell_reach(int face, double x, double y, double half) {
   double reach = 0.0;
   for (const double sx : {-half, half}) {
     for (const double sy : {-half, half}) {
-      reach = std::max(
-          reach, glm::length(glm::normalize(direction_from_cube_point(face, x + sx, y + sy)) - middle));
+      reach = std::max(reach,
+                       glm::length(glm::normalize(direction_from_cube_point(face, x + sx, y + sy)) - middle));
     }
   }
   return reach;
@@ -184,8 +184,9 @@ MomentGrid::MomentGrid(const EnvMapView& map, int first_channel, const SourceTex
   }
 }
 
-void MomentGrid::find(const LobePlan& plan, const float* center, double radius,
+void MomentGrid::find(const LobePlan& plan, int cells, const float* center, double radius,
                       std::vector<std::uint32_t>& list) const {
+  const int finest = std::countr_zero(static_cast<unsigned>(cells_ / cells));
   struct Visit {
     int level;
     std::uint32_t face;
@@ -211,7 +212,7 @@ void MomentGrid::find(const LobePlan& plan, const float* center, double radius,
     const double bound = static_cast<double>(node.bound);
     const double nearest = distance - radius - bound;
     if (nearest > plan.cut) continue;
-    bool enough = v.level == 0;
+    bool enough = v.level <= finest;
     if (!enough) {
       const double width = static_cast<double>(widths_[level][v.row * side + v.column]);
       double allowed = plan.allowed_at(nearest);

@@ -22,8 +22,10 @@ class MomentGrid {
   int cells() const { return cells_; }
   const MomentNode* nodes() const { return nodes_.data(); }
 
-  /// Appends the nodes to look at for all directions within a chord `radius` of `center`.
-  void find(const LobePlan& plan, const float* center, double radius, std::vector<std::uint32_t>& list) const;
+  /// Appends the nodes to look at for all directions within a chord `radius` of `center`, none of cells smaller than those
+  /// of a grid of `cells`.
+  void find(const LobePlan& plan, int cells, const float* center, double radius,
+            std::vector<std::uint32_t>& list) const;
 
   /// Cells along a side of a face for nodes of at most that many radians.
   static int cells_for(double node_width);

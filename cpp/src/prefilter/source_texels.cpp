@@ -41,7 +41,8 @@ glm::dvec3 SourceTexels::direction(int face, int row, int column) const {
   }
   const std::size_t longitude = static_cast<std::size_t>(column);
   const std::size_t latitude = static_cast<std::size_t>(width_) + static_cast<std::size_t>(row);
-  return {cosines_[latitude] * sines_[longitude], sines_[latitude], -cosines_[latitude] * cosines_[longitude]};
+  return {cosines_[latitude] * sines_[longitude], sines_[latitude],
+          -cosines_[latitude] * cosines_[longitude]};
 }
 
 double texel_width(const EnvMapLayout& layout) {

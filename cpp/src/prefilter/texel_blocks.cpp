@@ -35,7 +35,8 @@ class TexelBlocks::Walk {
     for (std::uint32_t k = 0; k < 4; ++k) {
       const std::uint32_t row = 2 * p.row + k / 2;
       const std::uint32_t column = 2 * p.column + k % 2;
-      if (row < static_cast<std::uint32_t>(finer.height) && column < static_cast<std::uint32_t>(finer.width)) {
+      if (row < static_cast<std::uint32_t>(finer.height) &&
+          column < static_cast<std::uint32_t>(finer.width)) {
         stack_[depth_++] = {p.level - 1, p.face, row, column};
       }
     }
@@ -45,8 +46,7 @@ class TexelBlocks::Walk {
     const int last_row = std::min(blocks_.height_, static_cast<int>(p.row + 1) * kSide);
     const int last_column = std::min(blocks_.width_, static_cast<int>(p.column + 1) * kSide);
     for (int row = static_cast<int>(p.row) * kSide; row < last_row; ++row) {
-      const std::size_t line =
-          (p.face * to_size(blocks_.height_) + to_size(row)) * to_size(blocks_.width_);
+      const std::size_t line = (p.face * to_size(blocks_.height_) + to_size(row)) * to_size(blocks_.width_);
       for (int column = static_cast<int>(p.column) * kSide; column < last_column; ++column) {
         visit(line + to_size(column));
       }
@@ -175,8 +175,7 @@ void TexelBlocks::make_moments(const EnvMapView& map, int first_channel, const S
       for (int column = 0; column < width_; ++column) {
         const double angle = texels.solid_angle(row, column);
         std::array<float, 4>& light = light_[line * to_size(width_) + to_size(column)];
-        const float* texel =
-            values + to_size(column / texels.parts()) * channels + to_size(first_channel);
+        const float* texel = values + to_size(column / texels.parts()) * channels + to_size(first_channel);
         for (std::size_t c = 0; c < used; ++c) {
           light[c] = static_cast<float>(angle * static_cast<double>(texel[c]));
         }

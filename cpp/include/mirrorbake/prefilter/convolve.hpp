@@ -24,7 +24,7 @@ struct PrefilterTarget {
 /// Convolves one map with any number of lobes, and keeps what it has found out about it.
 ///
 /// The texels of the source are lights at their middles, of their exact solid angle; those wider than 1.25 σ of the lobe
-/// are cut into parts. Nothing is thrown away but weights below 1e-9 of the lobe's peak. Cosine lobes (irradiance, Phong
+/// are cut into parts. Nothing is thrown away but weights below 4e-6 of the lobe's integral. Cosine lobes (irradiance, Phong
 /// with exponent 1, GGX with α = 1) are exact but for rounding: light before the horizon is summed by first
 /// moments, and along it texel by texel. Narrow lobes are summed texel by texel, too. All others read the moments of cells,
 /// each expanded about where most of its light comes from, so that a sun counts from where it stands; cells are as large
@@ -60,8 +60,8 @@ EnvMap irradiance(const EnvMapView& map, const PrefilterTarget& target);
 enum class RoughnessScale { squared, linear };
 
 struct ChainOptions {
-  int size = 256;   ///< of the faces of the cube
-  int levels = 0;   ///< 0: down to 4 × 4 texels, at least one
+  int size = 256;  ///< of the faces of the cube
+  int levels = 0;  ///< 0: down to 4 × 4 texels, at least one
   RoughnessScale roughness = RoughnessScale::squared;
   std::function<void(int level, int levels)> progress = {};  ///< after every level
 };

@@ -33,7 +33,7 @@ bool is_mirror(const Lobe& lobe);
 /// The weight at an angle with this cosine; D without its factor 1/(π α²), so that it is 1 at γ = 0.
 double lobe_weight(const Lobe& lobe, double cosine);
 
-/// ∫ weight dω over the sphere, to a relative 1e-9; of Phong 2π/(exponent + 1). A mirror's is 0.
+/// ∫ weight dω over the sphere, to a relative 1e-7 if the weight has no step; of Phong 2π/(exponent + 1). A mirror's is 0.
 double lobe_integral(const Lobe& lobe);
 
 /// α of the microfacets whose highlight is as wide as Phong's: √(2/(exponent + 2)) (Walter et al., after eq. 31).

@@ -147,7 +147,7 @@ void bind_tracer(nb::module_& m) {
       .def_prop_ro(
           "sample_beauty",
           [](nb::handle self) { return vectors_view(nb::cast<const LayerTrace&>(self).sample_beauty, self); },
-          "(n, 3): beauty value of each entry of `samples`, by the beauty integrator.");
+          "(n, 3): beauty value of each entry of `samples`: what the layers add up to.");
 
   nb::class_<Tracer>(
       m, "Tracer",

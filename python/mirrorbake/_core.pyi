@@ -1142,7 +1142,7 @@ class LayerTrace:
     @property
     def sample_beauty(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
         """
-        (n, 3): beauty value of each entry of `samples`, by the beauty integrator.
+        (n, 3): beauty value of each entry of `samples`: what the layers add up to.
         """
 
 class Tracer:

@@ -71,7 +71,9 @@ def test_layers_and_samples_recompose_the_beauty(tracer: Tracer) -> None:
     assert beauty.dtype == np.float32
     trace = tracer.trace_layers(CAMERA, 0, options)
     assert trace.layers.shape == (16, 24, len(trace.channels))
-    np.testing.assert_array_equal(trace.layers[..., [trace.channels.index(c) for c in "RGB"]], beauty)
+    of_layers = trace.layers[..., [trace.channels.index(c) for c in "RGB"]]
+    # The same terms added in another order.
+    np.testing.assert_allclose(of_layers, beauty, rtol=1e-5, atol=1e-6)
 
     s = trace.samples
     assert (s.width, s.height, s.samples_per_pixel) == (24, 16, 8)
@@ -80,8 +82,7 @@ def test_layers_and_samples_recompose_the_beauty(tracer: Tracer) -> None:
     np.testing.assert_array_equal(trace.layers[..., trace.channels.index("coverage")], coverage)
     local, distant = (np.asarray(shell.radiance) for shell in s.shells)
     sum_of_layers = s.diffuse + s.fresnel * (local[:, :3] + (1 - local[:, 3:]) * distant[:, :3])
-    # The same terms added in another order.
-    np.testing.assert_allclose(sum_of_layers, trace.sample_beauty, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(sum_of_layers, trace.sample_beauty, rtol=1e-6, atol=1e-7)
 
 
 def test_several_reflectors_are_traced_in_one_call() -> None:
@@ -93,7 +94,10 @@ def test_several_reflectors_are_traced_in_one_call() -> None:
     assert len(together) == 2
     for reflector, trace in zip((ring, ball), together, strict=True):
         assert len(trace.samples) > 20
-        np.testing.assert_array_equal(trace.layers, tracer.trace_layers(CAMERA, reflector, options).layers)
+        alone = tracer.trace_layers(CAMERA, reflector, options)
+        np.testing.assert_array_equal(trace.samples.diffuse, alone.samples.diffuse)
+        # The beauty adds the terms of the other reflector's samples in another order.
+        np.testing.assert_allclose(trace.layers, alone.layers, rtol=1e-5, atol=1e-6)
     with pytest.raises(_core.InvalidArgument, match="reflectors"):
         tracer.trace_layers_of(CAMERA, [ring, ring], options)
 

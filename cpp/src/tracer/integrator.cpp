@@ -66,40 +66,59 @@ struct DirectLight {
   glm::vec3 lobe{0.0F};  ///< to be multiplied with `surface.fresnel`
 };
 
-DirectLight direct_light(const World& world, const Surface& surface, glm::vec2 u, Partners partners,
-                         bool for_lobe) {
-  const std::optional<LightSample> light = world.lights.sample(surface.position, u, partners.all);
-  if (!light) return {};
-  const float cosine = glm::dot(surface.normal, light->direction);
-  if (!(cosine > 0.0F) || !(glm::dot(surface.geometric_normal, light->direction) > 0.0F)) return {};
+// What one direction brings.
+DirectLight direct_light(const World& world, const Surface& surface, const LightSample& light,
+                         Partners partners, bool for_lobe) {
+  const float cosine = glm::dot(surface.normal, light.direction);
+  if (!(cosine > 0.0F) || !(glm::dot(surface.geometric_normal, light.direction) > 0.0F)) return {};
 
   DirectLight found;
   const auto share = [&](bool shared, float pdf) {
-    return shared && light->pdf > 0.0F ? power_heuristic(light->pdf, pdf) : 1.0F;
+    return shared && light.pdf > 0.0F ? power_heuristic(light.pdf, pdf) : 1.0F;
   };
-  found.irradiance = share(partners.cosine, cosine * kInversePi) * cosine * light->radiance;
+  found.irradiance = share(partners.cosine, cosine * kInversePi) * cosine * light.radiance;
   if (for_lobe) {
     const Lobe lobe(surface);
-    const glm::vec3 direction = lobe.frame.to_local(light->direction);
+    const glm::vec3 direction = lobe.frame.to_local(light.direction);
     const float response = lobe_response(lobe.shape, lobe.view, direction);
     found.lobe = share(partners.lobe, lobe_density(lobe.shape, lobe.view, direction)) * response *
-                 fresnel_ratio(surface, lobe, direction) * light->radiance;
+                 fresnel_ratio(surface, lobe, direction) * light.radiance;
     if (surface.albedo == glm::vec3(0.0F) && found.lobe == glm::vec3(0.0F)) return {};
   }
 
   Ray shadow;
-  shadow.origin = offset_origin(surface, light->direction);
-  if (std::isfinite(light->distance)) {
-    const glm::vec3 to = surface.position + light->distance * light->direction - shadow.origin;
+  shadow.origin = offset_origin(surface, light.direction);
+  if (std::isfinite(light.distance)) {
+    const glm::vec3 to = surface.position + light.distance * light.direction - shadow.origin;
     const float distance = glm::length(to);
     if (!(distance > 0.0F)) return {};
     shadow.direction = to / distance;
     shadow.max_distance = distance * (1.0F - kShadowEpsilon);
   } else {
-    shadow.direction = light->direction;
+    shadow.direction = light.direction;
   }
   if (world.rays.all().occluded(shadow)) return {};
   return found;
+}
+
+// By Effort::one.
+DirectLight direct_light(const World& world, const Surface& surface, glm::vec2 u, Partners partners,
+                         bool for_lobe) {
+  const std::optional<LightSample> light = world.lights.sample(surface.position, u, partners.all);
+  return light ? direct_light(world, surface, *light, partners, for_lobe) : DirectLight{};
+}
+
+// By Effort::many.
+DirectLight direct_light(const World& world, const Surface& surface, const SampleStream& stream,
+                         std::uint32_t dimension, Partners partners, bool for_lobe) {
+  const LightSamples lights = world.lights.sample_many(surface.position, stream, dimension, partners.all);
+  DirectLight sum;
+  for (std::uint32_t i = 0; i < lights.count; ++i) {
+    const DirectLight found = direct_light(world, surface, lights.sample[i], partners, for_lobe);
+    sum.irradiance += found.irradiance;
+    sum.lobe += found.lobe;
+  }
+  return sum;
 }
 
 bool diffuse_follows(const LitWorld& lit, const PathLimits& limits) {
@@ -124,16 +143,16 @@ ScatteredLight scattered_light(const LitWorld& lit, const Surface& surface, cons
   const bool has_lobe = surface.rough() && specular_follows(surface, limits, bounce);
   if (!has_body && !has_lobe) return {};
   const bool path = diffuse_follows(lit, limits);
-  const DirectLight direct =
-      direct_light(world, surface, stream.get(dimension_base(bounce, 0) + light_dimension),
-                   {.cosine = path, .lobe = true, .all = path}, has_lobe);
+  const DirectLight direct = direct_light(world, surface, stream, dimension_base(bounce, 0) + light_dimension,
+                                          {.cosine = path, .lobe = true, .all = path}, has_lobe);
   ScatteredLight light;
   light.lobe = direct.lobe;
   if (!has_body) return light;
   glm::vec3 irradiance = direct.irradiance;
   if (lit.indirect.mode == IndirectLight::cached) irradiance += lit.indirect.cache.irradiance(surface);
   light.body = surface.albedo * kInversePi * irradiance;
-  if (path) light.body += surface.albedo * diffuse_path_radiance(lit, surface, limits, stream, bounce);
+  if (path)
+    light.body += surface.albedo * diffuse_path_radiance(lit, surface, limits, stream, bounce, Effort::many);
   return light;
 }
 
@@ -156,22 +175,22 @@ SpecularBounce specular_bounce(const Surface& surface, const SampleStream& strea
   return specular_bounce(surface, u);
 }
 
-glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf, bool shared) {
+glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf, NextEvent how) {
   if (hit.missed()) {
-    const EnvironmentSampler::Found found = world.lights.environment(ray.direction, shared);
+    const EnvironmentSampler::Found found = world.lights.environment(ray, how);
     return pdf > 0.0F ? power_heuristic(pdf, found.pdf) * found.radiance : found.radiance;
   }
   const int light = world.light_number(hit);
   const glm::vec3 radiance = world.lights.hit_radiance(light, ray);
   if (!(pdf > 0.0F) || radiance == glm::vec3(0.0F)) return radiance;
-  return power_heuristic(pdf, world.lights.hit_pdf(light, ray, hit.distance)) * radiance;
+  return power_heuristic(pdf, world.lights.hit_pdf(light, ray, hit.distance, how.effort)) * radiance;
 }
 
-glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, const Surface& surface,
-                        float pdf) {
+glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, const Surface& surface, float pdf,
+                        Effort effort) {
   if (!(pdf > 0.0F) || surface.emission == glm::vec3(0.0F)) return surface.emission;
   const float other =
-      world.lights.mesh_pdf(surface.object, surface.geometric_normal, ray.direction, hit.distance);
+      world.lights.mesh_pdf(surface.object, surface.geometric_normal, ray, hit.distance, effort);
   return power_heuristic(pdf, other) * surface.emission;
 }
 
@@ -184,10 +203,11 @@ glm::vec3 radiance(const LitWorld& lit, const Ray& first_ray, const Hit& first_h
   Hit hit = first_hit;
   for (;; ++bounce) {
     if (hit.missed() || world.is_light(hit))
-      return sum + throughput * emitted_light(world, ray, hit, pdf, diffuse_follows(lit, limits));
+      return sum +
+             throughput * emitted_light(world, ray, hit, pdf, {Effort::many, diffuse_follows(lit, limits)});
     const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
     const ScatteredLight scattered = scattered_light(lit, surface, limits, stream, bounce);
-    sum += throughput * (emitted_light(world, ray, hit, surface, pdf) + scattered.body);
+    sum += throughput * (emitted_light(world, ray, hit, surface, pdf, Effort::many) + scattered.body);
     if (!specular_follows(surface, limits, bounce)) return sum;
     throughput *= surface.fresnel;
     if (throughput == glm::vec3(0.0F)) return sum;
@@ -239,10 +259,11 @@ glm::vec3 guided_light(const LitWorld& lit, const Surface& start, CausticGuide::
   for (int chain = 0;; ++chain) {
     const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
     if (hit.missed() || world.is_light(hit)) {
-      return chain > 0 ? sum + throughput * emitted_light(world, ray, hit, lobe_pdf, true) : sum;
+      return chain > 0 ? sum + throughput * emitted_light(world, ray, hit, lobe_pdf, {Effort::one, true})
+                       : sum;
     }
     const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
-    if (chain > 0) sum += throughput * emitted_light(world, ray, hit, surface, lobe_pdf);
+    if (chain > 0) sum += throughput * emitted_light(world, ray, hit, surface, lobe_pdf, Effort::one);
     if (chain == CausticGuide::kSpecularBounces) return sum;
     if (!specular_follows(surface, limits, specular_bounces + chain)) return sum;
     throughput *= surface.fresnel;
@@ -270,7 +291,7 @@ float brightest(glm::vec3 c) { return std::max(c.x, std::max(c.y, c.z)); }
 }  // namespace
 
 glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const PathLimits& limits,
-                                const SampleStream& stream, int bounce) {
+                                const SampleStream& stream, int bounce, Effort effort) {
   const World& world = lit.world;
   glm::vec3 sum(0.0F);
   glm::vec3 throughput(1.0F);
@@ -278,8 +299,8 @@ glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const
   int diffuse_bounces = 0;
   int specular_bounces = 0;
   glm::vec3 direction(0.0F);
-  float pdf = 0.0F;    // 0 after a mirror: emission counts in full
-  bool shared = true;  // what next-event estimation took the followed rays for
+  float pdf = 0.0F;             // 0 after a mirror: emission counts in full
+  NextEvent how{effort, true};  // where the followed ray starts
   // Since the last diffuse surface: what is known of caustics there, the specular surfaces passed, and the weight of
   // the light that they show.
   CausticGuide::Cell cell;
@@ -303,9 +324,9 @@ glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const
     const Ray ray{offset_origin(surface, direction), direction};
     const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
     if (hit.missed() || world.is_light(hit))
-      return sum + chain_weight * throughput * emitted_light(world, ray, hit, pdf, shared);
+      return sum + chain_weight * throughput * emitted_light(world, ray, hit, pdf, how);
     surface = surface_at(world.scene, world.rays, hit, direction);
-    sum += chain_weight * throughput * emitted_light(world, ray, hit, surface, pdf);
+    sum += chain_weight * throughput * emitted_light(world, ray, hit, surface, pdf, how.effort);
 
     const VertexNumbers numbers(stream, bounce, vertex);
     const bool has_body = surface.albedo != glm::vec3(0.0F);
@@ -314,11 +335,11 @@ glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const
     const bool has_lobe = surface.rough() && continue_specular;
     if (continue_specular && chain == 0) chain_weight = guided_partner_weight(lit, cell, direction, pdf);
     if (chain == CausticGuide::kSpecularBounces) chain_weight = 1.0F;
-    shared = continue_diffuse || !has_body;
+    how = {Effort::one, continue_diffuse || !has_body};
     if (has_body || has_lobe) {
       const DirectLight direct =
           direct_light(world, surface, numbers(light_dimension),
-                       {.cosine = continue_diffuse, .lobe = true, .all = shared}, has_lobe);
+                       {.cosine = continue_diffuse, .lobe = true, .all = how.shared}, has_lobe);
       sum += throughput *
              (surface.albedo * kInversePi * direct.irradiance + chain_weight * surface.fresnel * direct.lobe);
     }

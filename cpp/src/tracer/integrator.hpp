@@ -47,10 +47,10 @@ SpecularBounce specular_bounce(const Surface& surface, const SampleStream& strea
 
 /// Emission of a light, of the sky or of `surface`, which the hit is on, towards the ray's origin. Where
 /// next-event estimation could have found it too it is weighted for a direction of density `pdf`; 0: it could
-/// not. `shared` as it was for next-event estimation (Lights).
-glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf, bool shared);
-glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, const Surface& surface,
-                        float pdf);
+/// not. `how` next-event estimation was done where the ray starts.
+glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, float pdf, NextEvent how);
+glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, const Surface& surface, float pdf,
+                        Effort effort);
 
 /// The beauty integrator: radiance that arrives along `ray`, whose closest hit is `hit`, `bounce` specular
 /// bounces away from the eye, `pdf` the density of the ray's direction in a rough lobe (0: from the eye or a
@@ -63,8 +63,8 @@ glm::vec3 radiance(const LitWorld& lit, const Ray& ray, const Hit& hit, const Pa
 glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec2 u, bool share_with_cosine);
 
 /// Radiance that a diffuse path finds which leaves `surface` in a random direction: an estimate of π⁻¹ ×
-/// irradiance. Includes the partner of `direct_irradiance` with `share_with_cosine`.
+/// irradiance. Includes the partner of next-event estimation of some `effort` at `surface`.
 glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& surface, const PathLimits& limits,
-                                const SampleStream& stream, int bounce);
+                                const SampleStream& stream, int bounce, Effort effort);
 
 }  // namespace mirrorbake::tracing

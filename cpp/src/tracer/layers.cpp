@@ -126,6 +126,8 @@ struct SpecularLayers {
   glm::vec3 distant{0.0F};
   float local_distance = std::numeric_limits<float>::infinity();
   float distant_distance = std::numeric_limits<float>::infinity();
+
+  glm::vec3 incident() const { return glm::vec3(local) + (1.0F - local.a) * distant; }
 };
 
 /// The shells that the layers are recorded as, front to back.
@@ -372,12 +374,13 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
         means.assign(traces.size(), {});
         for (int i = 0; i < options.samples_per_pixel; ++i) {
           const PrimarySample& sample = primary.next();
-          const glm::vec3 value =
-              tracing::radiance(lit, sample.ray, sample.hit, limits, sample.stream, 0, 0.0F);
-          beauty += glm::dvec3(value);
-          if (sample.hit.missed() || world.is_light(sample.hit)) continue;
-          const int number = number_of_object[sample.hit.geometry];
-          if (number < 0) continue;
+          const bool on_object = !sample.hit.missed() && !world.is_light(sample.hit);
+          const int number = on_object ? number_of_object[sample.hit.geometry] : -1;
+          if (number < 0) {
+            beauty +=
+                glm::dvec3(tracing::radiance(lit, sample.ray, sample.hit, limits, sample.stream, 0, 0.0F));
+            continue;
+          }
           const auto r = static_cast<std::size_t>(number);
           const Surface surface =
               tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
@@ -386,6 +389,8 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
           const glm::vec3 body = surface.emission + scattered.body;
           const SpecularLayers specular =
               trace_specular(lit, without[r], surface, scattered.lobe, limits, sample.stream);
+          const glm::vec3 value = body + surface.fresnel * specular.incident();
+          beauty += glm::dvec3(value);
           SurfaceSamples& out = rows[r][y].samples;
           record_surface(out, world, surface, sample.hit.distance,
                          rays.direction_with_differentials(sample.point), pixel_number(window, y, x));

@@ -121,8 +121,8 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
     : scene_(&scene),
       rays_(&rays),
       meshes_(scene.objects.size()),
-      mesh_probability_(scene.objects.size()),
-      hit_probability_(scene.rectangle_lights.size() + scene.sphere_lights.size()) {
+      light_of_mesh_(scene.objects.size(), -1),
+      light_of_hit_(scene.rectangle_lights.size() + scene.sphere_lights.size(), -1) {
   const double scene_disk =
       std::numbers::pi * static_cast<double>(rays.radius()) * static_cast<double>(rays.radius());
   for (std::size_t i = 0; i < scene.rectangle_lights.size(); ++i) add_rectangle(i);
@@ -144,9 +144,9 @@ Lights::Lights(const Scene& scene, const RayScene& rays)
   for (std::size_t i = 0; i < scene.objects.size(); ++i) add_mesh(i);
   if (scene.environment) {
     environment_.emplace(*scene.environment);
-    add(Kind::environment, 0, environment_->flux() * scene_disk);
+    add(Kind::environment, 0, glm::vec3(static_cast<float>(environment_->flux())), scene_disk);
   }
-  assign_probabilities();
+  if (!lights_.empty()) share_by_power();
 }
 
 void Lights::add_rectangle(std::size_t i) {
@@ -168,7 +168,7 @@ void Lights::add_rectangle(std::size_t i) {
   r.unit_u = glm::dvec3(light.edge_u) / r.width;
   r.unit_v = glm::dvec3(light.edge_v) / r.height;
   rectangles_.push_back(r);
-  add(Kind::rectangle, i, static_cast<double>(luminance(light.radiance) * r.area * kPi));
+  add(Kind::rectangle, i, light.radiance, static_cast<double>(r.area) * std::numbers::pi);
 }
 
 void Lights::add_sphere(std::size_t i) {
@@ -197,43 +197,36 @@ void Lights::add_mesh(std::size_t i) {
   mesh.area =
       static_cast<float>(normalise_cdf(mesh.area_cdf.data(), areas.data(), static_cast<int>(areas.size())));
   mesh.is_reflected = (object.visibility & Visibility::reflection) != Visibility::none;
-  add(Kind::mesh, i, static_cast<double>(luminance(emission) * mesh.area * kPi));
+  const Bounds& bounds = rays_->object_bounds(static_cast<int>(i));
+  mesh.centre = 0.5F * (bounds.min + bounds.max);
+  mesh.radius = 0.5F * glm::length(bounds.max - bounds.min);
+  add(Kind::mesh, i, emission, static_cast<double>(mesh.area) * std::numbers::pi);
 }
 
-void Lights::assign_probabilities() {
+void Lights::add(Kind kind, std::size_t index, glm::vec3 strength, double power_of_one) {
+  const float of_strength = luminance(strength);
+  const double power = static_cast<double>(of_strength) * power_of_one;
+  if (!(power > 0.0)) return;
+  const auto number = static_cast<int>(lights_.size());
+  lights_.push_back({kind, static_cast<int>(index), power, of_strength});
+  if (kind == Kind::mesh) light_of_mesh_[index] = number;
+  if (kind == Kind::rectangle) light_of_hit_[index] = number;
+  if (kind == Kind::sphere) light_of_hit_[rectangles_.size() + index] = number;
+  if (kind == Kind::environment) light_of_environment_ = number;
+}
+
+void Lights::share_by_power() {
   double total = 0.0;
   for (const Light& light : lights_) total += light.power;
   std::vector<double> shares;
-  for (Light& light : lights_) {
-    const double equal = 1.0 / static_cast<double>(lights_.size());
-    shares.push_back(total > 0.0 ? 0.5 * equal + 0.5 * light.power / total : equal);
-  }
-  cdf_.resize(lights_.size() + 1);
-  if (!lights_.empty()) normalise_cdf(cdf_.data(), shares.data(), static_cast<int>(lights_.size()));
-  for (std::size_t i = 0; i < lights_.size(); ++i) {
-    Light& light = lights_[i];
-    light.probability = cdf_[i + 1] - cdf_[i];
-    const auto index = static_cast<std::size_t>(light.index);
-    if (light.kind == Kind::mesh) mesh_probability_[index] = light.probability;
-    if (light.kind == Kind::rectangle) hit_probability_[index] = light.probability;
-    if (light.kind == Kind::sphere) hit_probability_[rectangles_.size() + index] = light.probability;
-    if (light.kind == Kind::environment) environment_probability_ = light.probability;
-  }
+  const double equal = 1.0 / static_cast<double>(lights_.size());
+  for (const Light& light : lights_) shares.push_back(0.5 * equal + 0.5 * light.power / total);
+  power_cdf_.resize(lights_.size() + 1);
+  normalise_cdf(power_cdf_.data(), shares.data(), static_cast<int>(lights_.size()));
 }
 
-void Lights::add(Kind kind, std::size_t index, double power) {
-  if (power > 0.0) lights_.push_back({kind, static_cast<int>(index), power});
-}
-
-void Lights::add(Kind kind, std::size_t index, glm::vec3 strength, double power) {
-  add(kind, index, static_cast<double>(luminance(strength)) * power);
-}
-
-std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u, bool shared) const {
-  if (lights_.empty()) return std::nullopt;
-  const CdfSample pick = sample_cdf(cdf_.data(), static_cast<int>(lights_.size()), u.x);
-  const Light& light = lights_[static_cast<std::size_t>(pick.index)];
-  u.x = pick.place;
+std::optional<LightSample> Lights::sample_light(const Light& light, glm::vec3 position, glm::vec2 u,
+                                                bool shared) const {
   const auto index = static_cast<std::size_t>(light.index);
   std::optional<LightSample> sample;
   switch (light.kind) {
@@ -268,10 +261,6 @@ std::optional<LightSample> Lights::sample(glm::vec3 position, glm::vec2 u, bool 
       }
       break;
     }
-  }
-  if (sample) {
-    sample->radiance /= light.probability;
-    sample->pdf *= light.probability;
   }
   return sample;
 }
@@ -329,10 +318,10 @@ std::optional<LightSample> Lights::sample_rectangle(const Rectangle& r, glm::vec
   return LightSample{direction, distance, r.radiance / pdf, pdf};
 }
 
-EnvironmentSampler::Found Lights::environment(glm::vec3 direction, bool shared) const {
+EnvironmentSampler::Found Lights::environment(const Ray& ray, NextEvent how) const {
   if (!environment_) return {glm::vec3(0.0F), 0.0F};
-  EnvironmentSampler::Found found = environment_->find(direction, shared);
-  found.pdf *= environment_probability_;
+  EnvironmentSampler::Found found = environment_->find(ray.direction, how.shared);
+  found.pdf *= mean_samples(light_of_environment_, ray.origin, how.effort);
   return found;
 }
 
@@ -346,28 +335,30 @@ glm::vec3 Lights::hit_radiance(int light, const Ray& ray) const {
   return glm::length(ray.origin - s.centre) > s.radius ? s.radiance : glm::vec3(0.0F);
 }
 
-float Lights::hit_pdf(int light, const Ray& ray, float distance) const {
+float Lights::hit_pdf(int light, const Ray& ray, float distance, Effort effort) const {
   const auto index = static_cast<std::size_t>(light);
-  const float probability = hit_probability_[index];
+  const float samples = mean_samples(light_of_hit_[index], ray.origin, effort);
   if (index >= rectangles_.size()) {
     const Sphere& s = spheres_[index - rectangles_.size()];
     const double cap = cone_cap(glm::length(glm::dvec3(s.centre) - glm::dvec3(ray.origin)), s.radius);
-    return cap > 0.0 ? probability / static_cast<float>(2.0 * std::numbers::pi * cap) : 0.0F;
+    return cap > 0.0 ? samples / static_cast<float>(2.0 * std::numbers::pi * cap) : 0.0F;
   }
   const Rectangle& r = rectangles_[index];
   if (by_solid_angle(r.centre, r.diagonal, r.orthogonal, ray.origin)) {
     const double solid_angle = seen_from(r, ray.origin).solid_angle;
-    return solid_angle > 0.0 ? probability * static_cast<float>(1.0 / solid_angle) : 0.0F;
+    return solid_angle > 0.0 ? samples * static_cast<float>(1.0 / solid_angle) : 0.0F;
   }
   const float cosine = -glm::dot(ray.direction, r.normal);
-  return cosine > 0.0F ? probability * distance * distance / (r.area * cosine) : 0.0F;
+  return cosine > 0.0F ? samples * distance * distance / (r.area * cosine) : 0.0F;
 }
 
-float Lights::mesh_pdf(int object, glm::vec3 geometric_normal, glm::vec3 direction, float distance) const {
+float Lights::mesh_pdf(int object, glm::vec3 geometric_normal, const Ray& ray, float distance,
+                       Effort effort) const {
   const auto index = static_cast<std::size_t>(object);
-  const float cosine = -glm::dot(direction, geometric_normal);
-  if (!(cosine > 0.0F) || mesh_probability_[index] == 0.0F) return 0.0F;
-  return mesh_probability_[index] * distance * distance / (meshes_[index].area * cosine);
+  const float cosine = -glm::dot(ray.direction, geometric_normal);
+  if (!(cosine > 0.0F) || light_of_mesh_[index] < 0) return 0.0F;
+  return mean_samples(light_of_mesh_[index], ray.origin, effort) * distance * distance /
+         (meshes_[index].area * cosine);
 }
 
 }  // namespace mirrorbake::tracing

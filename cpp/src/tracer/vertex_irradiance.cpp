@@ -52,7 +52,8 @@ std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint
         const Surface start = surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), n);
         glm::vec3 found = direct_irradiance(world, start, stream.get(light_dimension), path);
         if (path) {
-          found += std::numbers::pi_v<float> * diffuse_path_radiance(state_->lit, start, limits, stream, 1);
+          found += std::numbers::pi_v<float> *
+                   diffuse_path_radiance(state_->lit, start, limits, stream, 1, Effort::one);
         } else if (cached) {
           const glm::vec3 direction =
               sample_cosine_hemisphere(Frame(start.normal), stream.get(diffuse_dimension));

@@ -83,7 +83,7 @@ struct BeautyTrace {
 struct LayerTrace {
   Image layers;
   SurfaceSamples samples;  ///< with the traced light
-  /// Beauty value of each entry of `samples`, by the beauty integrator.
+  /// Beauty value of each entry of `samples`: what the layers add up to.
   std::vector<glm::vec3> sample_beauty;
 };
 
@@ -127,7 +127,7 @@ class Tracer {
   LayerTrace trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const;
 
   /// The same for several reflectors, all different, which share the rays from the eye: one LayerTrace each,
-  /// with the same bits as alone.
+  /// with the same bits as alone but for the roundings of the beauty image.
   std::vector<LayerTrace> trace_layers(const Camera& camera, std::span<const int> reflectors,
                                        const TraceOptions& options) const;
 

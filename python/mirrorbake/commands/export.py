@@ -13,7 +13,7 @@ from mirrorbake.commands.options import (
     Folder,
     Threads,
 )
-from mirrorbake.commands.progress import messages
+from mirrorbake.commands.progress import messages, progress
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -48,6 +48,30 @@ def export_command(
             "--glb", metavar="OUT.glb", help="A glTF file with the mesh, its material and the maps."
         ),
     ] = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(
+            "--video", metavar="OUT.mp4", help="A film along the first axis of the parameter space."
+        ),
+    ] = None,
+    stills: Annotated[
+        Path | None,
+        typer.Option("--stills", metavar="OUT{}.png", help="The same as pictures, .png or .exr; {}: number."),
+    ] = None,
+    frames: Annotated[
+        int | None,
+        typer.Option("--frames", metavar="N", help="Of --video and --stills. [default: one per sample]"),
+    ] = None,
+    fps: Annotated[int, typer.Option("--fps", metavar="N", help="Frames per second of --video.")] = 30,
+    exposure: Annotated[
+        float, typer.Option("--exposure", metavar="STOPS", help="Of --video and PNG stills.")
+    ] = 0.0,
+    tone: Annotated[
+        str,
+        typer.Option(
+            "--tone", metavar="none|neutral", help="Tone mapping of both: clipped, or Khronos PBR Neutral."
+        ),
+    ] = "none",
     sample: Annotated[
         int | None,
         typer.Option(
@@ -61,9 +85,9 @@ def export_command(
     ] = False,
     threads: Threads = 0,
 ) -> None:
-    """Write a PEM for other programs: its maps, a glTF file."""
-    if maps is None and glb is None:
-        raise typer.BadParameter("nothing to write: give --maps or --glb")
+    """Write a PEM for other programs: its maps, a glTF file, a film, pictures."""
+    if maps is None and glb is None and video is None and stills is None:
+        raise typer.BadParameter("nothing to write: give --maps, --glb, --video or --stills")
     if sample is not None and all_samples:
         raise typer.BadParameter("--sample and --all exclude each other")
     with _core.ThreadLimit(threads):
@@ -71,6 +95,8 @@ def export_command(
             _export_maps(directory, maps, format, convention, precision, sample, all_samples)
         if glb is not None:
             _export_glb(directory, glb, sample, all_samples)
+        if video is not None or stills is not None:
+            _export_pictures(directory, video, stills, frames, fps, exposure, tone)
 
 
 def _export_maps(
@@ -125,6 +151,37 @@ def _export_glb(directory: Path, out: Path, sample: int | None, all_samples: boo
     built = build_scene(unchanged_config(store))
     export_glb(store, built, out, samples=samples, report=_print_message)
     _print_message(f"wrote {out}")
+
+
+def _export_pictures(
+    directory: Path,
+    video: Path | None,
+    stills: Path | None,
+    frames: int | None,
+    fps: int,
+    exposure: float,
+    tone: str,
+) -> None:
+    from mirrorbake.pem.export.video import export_stills, export_video
+    from mirrorbake.pem.opened import open_pem
+
+    pem = open_pem(directory)
+    with progress() as add_bar:
+        if video is not None:
+            export_video(
+                pem,
+                video,
+                frames=frames,
+                frames_per_second=fps,
+                exposure=exposure,
+                tone=tone,
+                report=add_bar("video"),
+            )
+        if stills is not None:
+            export_stills(pem, stills, frames=frames, exposure=exposure, tone=tone, report=add_bar("stills"))
+    for out in (video, stills):
+        if out is not None:
+            _print_message(f"wrote {out}")
 
 
 def _print_message(text: str) -> None:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.opened import OpenedPem
     from mirrorbake.scene.parameters import PointLike
 
 PICTURE_SUFFIXES = (".exr", ".png")
@@ -45,13 +46,17 @@ def render(directory: Path, point: PointLike, out: Path) -> FloatArray:
     if out.suffix.lower() not in PICTURE_SUFFIXES:
         raise InputError(f"{out}: expected a name that ends in {' or '.join(PICTURE_SUFFIXES)}")
     check_writable(out)
-    pem = open_pem(directory)
+    picture = picture_of(open_pem(directory), point)
+    _core.save_image(str(out), picture, ["R", "G", "B"])
+    return picture
+
+
+def picture_of(pem: OpenedPem, point: PointLike) -> FloatArray:
+    """Draw an opened PEM over its ray-traced background; as `render`, which writes the picture too."""
     blend = pem.space.neighbours(point)
     if len(blend) == 1 and pem.space.sample(blend[0][0]) == pem.space.point(point):
         samples, images = pem.stage.visibility(point), pem.store.read_images(blend[0][0])
     else:
         trace = pem.stage.trace(point)
         samples, images = trace.samples, images_of_trace(trace)
-    picture = images.composite(pem.run_time.render("pem", point, samples))
-    _core.save_image(str(out), picture, ["R", "G", "B"])
-    return picture
+    return images.composite(pem.run_time.render("pem", point, samples))

@@ -58,7 +58,7 @@ def cases() -> Iterator[Case]:
     )
 
     weights = core.display_row_weights(matrix, 16, target)
-    root = np.sqrt(weights)[:, None]
+    root = np.sqrt(weights[:, :1])
     options = core.SolveOptions(
         smoothness=0.0, level_agreement=0.0, tolerance=1e-30, max_iterations=ITERATIONS
     )

@@ -12,6 +12,7 @@ void bind_scene(nb::module_& m);
 void bind_surface(nb::module_& m);
 void bind_tracer(nb::module_& m);
 void bind_projection(nb::module_& m);
+void bind_display_fit(nb::module_& m);
 void bind_inference(nb::module_& m);
 void bind_pem(nb::module_& m);
 void bind_prefilter(nb::module_& m);
@@ -32,6 +33,7 @@ NB_MODULE(_core, m) {
   bind_projection(m);
   bind_envmap(m);
   bind_inference(m);
+  bind_display_fit(m);
   bind_pem(m);
   bind_prefilter(m);
   bind_shading(m);

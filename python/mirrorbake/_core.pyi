@@ -1613,6 +1613,83 @@ class MapSolver:
         and a report.
         """
 
+class ViewTargets:
+    """
+    What maps should make a view look like: sums over traced samples, pixel by pixel, so that a view of many
+    samples never has to be in memory at once.
+    """
+
+    def __init__(self, width: int, height: int, parts: int, shells: int) -> None: ...
+
+    def add(self, samples: SurfaceSamples, x: int = 0, y: int = 0) -> None:
+        """
+        Adds samples with traced light, at most one trace of every pixel; (x, y): where their image's top left pixel lies
+        in this one.
+        """
+
+    @property
+    def width(self) -> int: ...
+
+    @property
+    def height(self) -> int: ...
+
+    @property
+    def parts(self) -> int: ...
+
+    @property
+    def shells(self) -> int: ...
+
+class FitShell:
+    """A shell as a part of the reflector sees it."""
+
+    def __init__(self, proxy: Proxy, map: int, triangles: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None:
+        """
+        map: number of its map, which several parts may share. triangles: uint8, 0 for each triangle of the reflector that
+        the shell leaves out, or None if it covers all.
+        """
+
+class DisplayView:
+    """A traced view, as the run time will look up its maps."""
+
+    def __init__(self, lookups: SurfaceSamples, targets: ViewTargets, nodes: Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0) -> None:
+        """
+        lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at RunTimeModel.places). nodes:
+        whose maps are blended for the view, with their weights. weight: of its rows, >= 0.
+        """
+
+class DisplayFitOptions:
+    """How maps are fitted to displayed pixels."""
+
+    def __init__(self, *, solve: SolveOptions = ..., layer_weight: float = 0.10000000149011612, softening: float = 0.029999999329447746, passes: int = 2) -> None: ...
+
+    @property
+    def solve(self) -> SolveOptions: ...
+
+    @property
+    def layer_weight(self) -> float:
+        """Weight of the layers' own rows beside the pixels', >= 0."""
+
+    @property
+    def softening(self) -> float:
+        """
+        Below this radiance the derivative of the display's curve is held, in (0, 1].
+        """
+
+    @property
+    def passes(self) -> int:
+        """
+        How often the rows' weights are taken from the model's own image, 1 to 16.
+        """
+
+def fit_display(views: Sequence[DisplayView], parts: Sequence[Sequence[FitShell]], maps: Sequence[TexelTopology], nodes: int = 1, run_time: RunTimeModel = ..., options: DisplayFitOptions = ..., prior: numpy.typing.NDArray[numpy.float32] | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport]]:
+    """
+    Infers the maps of all shells and parts, of one or several nodes, together, from the pixels that the run time will show.
+
+    parts: the shells of each part, front to back, in the order of the traced shells; the last is opaque. prior: float32
+    (nodes * texels, 3) or None. Returns the maps, float32 (nodes * texels, 4), premultiplied radiance and alpha, those of
+    a node stacked in the order of `maps`; and reports of the layers' own fit, then of each pass.
+    """
+
 class ShellMap:
     """The map of one shell, as a part of the reflector reads it."""
 

@@ -161,3 +161,29 @@ def test_diffuse_radiance_is_albedo_times_irradiance_over_pi(trace: mb.LayerTrac
     irradiance = np.ones_like(np.asarray(ball.positions))
     diffuse = mb.diffuse_from_irradiance(trace.samples, np.asarray(ball.triangles), irradiance)
     np.testing.assert_allclose(diffuse, np.asarray(trace.samples.albedo) / np.pi, rtol=1e-6)
+
+
+def test_a_display_fit_shows_the_traced_ball(trace: mb.LayerTrace) -> None:
+    targets = mb.ViewTargets(SIZE, SIZE, 1, 2)
+    targets.add(trace.samples)
+    parts = [[mb.FitShell(Proxy.ellipsoid((0, 0, 0), (1.1, 1.1, 1.1)), 0), mb.FitShell(PROXY, 1)]]
+    maps = [mb.TexelTopology.cube(16)] * 2
+    view = mb.DisplayView(trace.samples, targets)
+    texels, reports = mb.fit_display([view], parts, maps)
+    assert texels.shape == (2 * LAYOUT.texels, 4)
+    assert len(reports) == 1 + mb.DisplayFitOptions().passes
+    local, distant = np.split(np.asarray(texels), 2)
+    shells = [
+        mb.ShellMap(parts_proxy, maps[0], np.ascontiguousarray(part))
+        for parts_proxy, part in [
+            (Proxy.ellipsoid((0, 0, 0), (1.1, 1.1, 1.1)), local),
+            (PROXY, distant[:, :3]),
+        ]
+    ]
+    image = mb.render_reflector(trace.samples, [shells], run_time=mb.run_time_model("Web"))
+    channels = list(trace.channels)
+    layers = np.asarray(trace.layers)
+    seen = layers[..., channels.index("coverage")] == 1.0
+    beauty = layers[..., :3][seen]
+    # A ball reflects nothing of itself, and the walls are flat colours: what is left lies at their edges.
+    assert np.sqrt(np.mean((image[..., :3][seen] - beauty) ** 2)) < 0.2 * beauty.std()

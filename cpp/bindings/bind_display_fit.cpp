@@ -1,0 +1,146 @@
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/vector.h>
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "bind.hpp"
+#include "mirrorbake/inference/display_fit.hpp"
+
+namespace mirrorbake::bindings {
+namespace {
+
+// Keeps the array of triangles alive.
+struct OwnedFitShell {
+  Proxy proxy;
+  int map;
+  std::optional<ByteArray> triangles;
+};
+
+struct OwnedDisplayView {
+  const SurfaceSamples* lookups;
+  const ViewTargets* targets;
+  std::vector<std::pair<int, float>> nodes;
+  float weight;
+};
+
+void bind_targets(nb::module_& m) {
+  nb::class_<ViewTargets>(
+      m, "ViewTargets",
+      "What maps should make a view look like: sums over traced samples, pixel by pixel, so that "
+      "a view of many\nsamples never has to be in memory at once.")
+      .def(nb::init<int, int, int, int>(), nb::arg("width"), nb::arg("height"), nb::arg("parts"),
+           nb::arg("shells"))
+      .def("add", &ViewTargets::add, nb::arg("samples"), nb::arg("x") = 0, nb::arg("y") = 0,
+           nb::call_guard<nb::gil_scoped_release>(),
+           "Adds samples with traced light, at most one trace of every pixel; (x, y): where their image's "
+           "top left "
+           "pixel lies\nin this one.")
+      .def_prop_ro("width", &ViewTargets::width)
+      .def_prop_ro("height", &ViewTargets::height)
+      .def_prop_ro("parts", &ViewTargets::parts)
+      .def_prop_ro("shells", &ViewTargets::shells);
+}
+
+}  // namespace
+
+void bind_display_fit(nb::module_& m) {
+  bind_targets(m);
+  nb::class_<OwnedFitShell>(m, "FitShell", "A shell as a part of the reflector sees it.")
+      .def(
+          "__init__",
+          [](OwnedFitShell* self, const Proxy& proxy, int map, std::optional<ByteArray> triangles) {
+            new (self) OwnedFitShell{proxy, map, std::move(triangles)};
+          },
+          nb::arg("proxy"), nb::arg("map"), nb::arg("triangles") = nb::none(),
+          "map: number of its map, which several parts may share. triangles: uint8, 0 for each triangle of "
+          "the "
+          "reflector that\nthe shell leaves out, or None if it covers all.");
+  nb::class_<OwnedDisplayView>(m, "DisplayView", "A traced view, as the run time will look up its maps.")
+      .def(
+          "__init__",
+          [](OwnedDisplayView* self, const SurfaceSamples& lookups, const ViewTargets& targets,
+             std::vector<std::pair<int, float>> nodes, float weight) {
+            new (self) OwnedDisplayView{&lookups, &targets, std::move(nodes), weight};
+          },
+          nb::arg("lookups"), nb::arg("targets"),
+          nb::arg("nodes") = std::vector<std::pair<int, float>>{{0, 1.0F}}, nb::arg("weight") = 1.0F,
+          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
+          nb::sig("def __init__(self, lookups: SurfaceSamples, targets: ViewTargets, nodes: "
+                  "collections.abc.Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0) -> None"),
+          "lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at "
+          "RunTimeModel.places). "
+          "nodes:\nwhose maps are blended for the view, with their weights. weight: of its rows, >= 0.");
+  nb::class_<DisplayFitOptions>(m, "DisplayFitOptions", "How maps are fitted to displayed pixels.")
+      .def(
+          "__init__",
+          [](DisplayFitOptions* self, const SolveOptions& solve, float layer_weight, float softening,
+             int passes) {
+            new (self) DisplayFitOptions{solve, layer_weight, softening, passes};
+          },
+          nb::kw_only(), nb::arg("solve") = SolveOptions{},
+          nb::arg("layer_weight") = DisplayFitOptions{}.layer_weight,
+          nb::arg("softening") = DisplayFitOptions{}.softening,
+          nb::arg("passes") = DisplayFitOptions{}.passes)
+      .def_ro("solve", &DisplayFitOptions::solve)
+      .def_ro("layer_weight", &DisplayFitOptions::layer_weight,
+              "Weight of the layers' own rows beside the pixels', >= 0.")
+      .def_ro("softening", &DisplayFitOptions::softening,
+              "Below this radiance the derivative of the display's curve is held, in (0, 1].")
+      .def_ro("passes", &DisplayFitOptions::passes,
+              "How often the rows' weights are taken from the model's own image, 1 to 16.");
+  m.def(
+      "fit_display",
+      [](const std::vector<const OwnedDisplayView*>& views,
+         const std::vector<std::vector<const OwnedFitShell*>>& parts, const std::vector<TexelTopology>& maps,
+         int nodes, const RunTimeModel& run_time, const DisplayFitOptions& options,
+         std::optional<FloatMatrix> prior) {
+        std::vector<DisplayView> display_views;
+        for (const OwnedDisplayView* view : views) {
+          DisplayView& to =
+              display_views.emplace_back(DisplayView{view->lookups, view->targets, {}, view->weight});
+          for (const auto& [node, weight] : view->nodes) to.nodes.push_back({node, weight});
+        }
+        std::vector<FitPart> fit_parts;
+        for (const auto& shells : parts) {
+          FitPart& part = fit_parts.emplace_back();
+          for (const OwnedFitShell* shell : shells) {
+            part.push_back({shell->proxy, shell->map, {}});
+            if (shell->triangles)
+              part.back().triangles = {shell->triangles->data(), shell->triangles->size()};
+          }
+        }
+        std::span<const float> prior_view;
+        if (prior) prior_view = {prior->data(), prior->size()};
+        DisplayFit fit;
+        {
+          const nb::gil_scoped_release unlocked;
+          fit = fit_display(display_views, fit_parts, maps, nodes, run_time, options, prior_view);
+        }
+        const std::size_t texels = fit.texels.size() / 4;
+        std::vector<SolveReport> reports{fit.layers};
+        reports.insert(reports.end(), fit.passes.begin(), fit.passes.end());
+        return nb::make_tuple(to_numpy(std::move(fit.texels), {texels, 4}), reports);
+      },
+      nb::arg("views"), nb::arg("parts"), nb::arg("maps"), nb::arg("nodes") = 1,
+      nb::arg("run_time") = web_run_time(), nb::arg("options") = DisplayFitOptions{},
+      nb::arg("prior") = nb::none(),
+      nb::sig(
+          "def fit_display(views: collections.abc.Sequence[DisplayView], parts: "
+          "collections.abc.Sequence[collections.abc.Sequence[FitShell]], maps: "
+          "collections.abc.Sequence[TexelTopology], nodes: int = 1, run_time: RunTimeModel = ..., options: "
+          "DisplayFitOptions = ..., prior: numpy.typing.NDArray[numpy.float32] | None = None) -> "
+          "tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport]]"),
+      "Infers the maps of all shells and parts, of one or several nodes, together, from the pixels that the "
+      "run time "
+      "will show.\n\nparts: the shells of each part, front to back, in the order of the traced shells; the "
+      "last is "
+      "opaque. prior: float32\n(nodes * texels, 3) or None. Returns the maps, float32 (nodes * texels, 4), "
+      "premultiplied radiance and alpha, those of\na node stacked in the order of `maps`; and reports of the "
+      "layers' "
+      "own fit, then of each pass.");
+}
+
+}  // namespace mirrorbake::bindings

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mirrorbake/inference/map_solver.hpp"
+#include "mirrorbake/inference/view_targets.hpp"
+#include "mirrorbake/proxy/proxy.hpp"
+#include "mirrorbake/surface/run_time_model.hpp"
+
+/// The joint display fit: maps of all shells and parts, of one or several nodes, inferred together from the pixels that a
+/// renderer will show. [PEM] §4 infers every layer by itself, and so spends texels on what no pixel shows.
+namespace mirrorbake {
+
+/// A shell as a part sees it. Several parts may share a map.
+struct FitShell {
+  Proxy proxy;
+  int map = 0;  ///< number of its map
+  std::span<const std::uint8_t> triangles =
+      {};  ///< 0 for those that the shell leaves out; empty: it covers all
+};
+
+/// Front to back, in the order of the traced shells; the last is opaque.
+using FitPart = std::vector<FitShell>;
+
+/// A traced view, as the run time will look up its maps.
+struct DisplayView {
+  const SurfaceSamples* lookups = nullptr;  ///< where the run time's lookups meet the reflector
+  const ViewTargets* targets = nullptr;
+  std::vector<NodeWeight> nodes = {{}};  ///< whose maps are blended for it
+  float weight = 1.0F;                   ///< of its rows, ≥ 0
+};
+
+struct DisplayFitOptions {
+  SolveOptions solve;
+  /// μ, weight of the layers' own rows beside the pixels', ≥ 0.
+  float layer_weight = 0.1F;
+  /// Below this radiance the derivative of the display's curve is held, in (0, 1].
+  float softening = 0.03F;
+  /// How often the weights of the rows are taken from the model's own image, 1…16.
+  int passes = 2;
+};
+
+struct DisplayFit {
+  /// nodes × texels of all maps × 4: premultiplied radiance, and α.
+  std::vector<float> texels;
+  SolveReport layers;               ///< of the layers' own fit, which finds α and where to start
+  std::vector<SolveReport> passes;  ///< of the joint fit
+};
+
+/// Row of a pixel: mean over its lookups of F · transmittance · reads, the transmittance Π(1 − α) of the shells in front by
+/// the α of the layers' own fit; target: the traced pixel less its diffuse light; weight: coverage times the squared
+/// derivative of the display's curve (sRGB) at the model's own image, since at a noisy target it would prefer what came out
+/// dark. Beside them, weighted by μ, the rows of every layer by itself. `prior`: empty, or nodes × texels × 3.
+///
+/// F enters per channel: a row's weights follow the mean of its channels, each channel's scale its own, which is exact where
+/// F has one hue within a pixel.
+///
+/// Throws InvalidArgument for parts, maps, images or options that do not fit together.
+DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPart> parts,
+                       std::span<const TexelTopology> maps, int nodes, const RunTimeModel& run_time,
+                       const DisplayFitOptions& options = {}, std::span<const float> prior = {});
+
+}  // namespace mirrorbake

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "mirrorbake/surface/surface_samples.hpp"
+
+namespace mirrorbake {
+
+/// What maps should make a view look like: sums over traced samples, pixel by pixel, so that a view of many samples never has
+/// to be in memory at once.
+class ViewTargets {
+ public:
+  /// Of an image of width × height pixels, a reflector of `parts` parts, and as many shells as the samples will have.
+  /// Throws InvalidArgument for a number below 1.
+  ViewTargets(int width, int height, int parts, int shells);
+
+  /// Adds samples with traced light, at most one trace of every pixel. (x, y): where their image's top left pixel lies in this one. Throws InvalidArgument
+  /// if they do not fit, have no light, or light that is not finite.
+  void add(const SurfaceSamples& samples, int x = 0, int y = 0);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  int parts() const { return parts_; }
+  int shells() const { return shells_; }
+
+  /// Traced samples of a pixel, those beside the reflector included.
+  double samples_per_pixel() const { return samples_per_pixel_; }
+  /// Of a pixel that see a part.
+  std::uint32_t count(std::size_t pixel, int part) const { return counts_[at(pixel, part)]; }
+  std::uint32_t count(std::size_t pixel) const;
+  /// Means over the samples that see the reflector: F times the incident light, and the body's own light D.
+  glm::vec3 reflected(std::size_t pixel) const;
+  glm::vec3 diffuse(std::size_t pixel) const;
+  /// Mean over the samples that see the part.
+  glm::vec4 shell(std::size_t pixel, int part, int shell) const;
+
+ private:
+  std::size_t at(std::size_t pixel, int part) const {
+    return pixel * static_cast<std::size_t>(parts_) + static_cast<std::size_t>(part);
+  }
+
+  int width_, height_, parts_, shells_;
+  double samples_per_pixel_ = 0.0;
+  std::vector<std::uint32_t> counts_;
+  std::vector<glm::dvec3> reflected_, diffuse_;
+  std::vector<glm::dvec4> radiance_;
+};
+
+}  // namespace mirrorbake

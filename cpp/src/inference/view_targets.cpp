@@ -1,0 +1,83 @@
+#include "mirrorbake/inference/view_targets.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "mirrorbake/core/check.hpp"
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/surface/shells.hpp"
+
+namespace mirrorbake {
+
+ViewTargets::ViewTargets(int width, int height, int parts, int shells)
+    : width_(width), height_(height), parts_(parts), shells_(shells) {
+  check_range("width", width, 1, 16384);
+  check_range("height", height, 1, 16384);
+  check_range("parts", parts, 1, 65536);
+  check_range("shells", shells, 1, 64);
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  counts_.resize(pixels * static_cast<std::size_t>(parts));
+  reflected_.resize(pixels);
+  diffuse_.resize(pixels);
+  radiance_.resize(counts_.size() * static_cast<std::size_t>(shells));
+}
+
+void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
+  if (x < 0 || y < 0 || samples.width > width_ - x || samples.height > height_ - y) {
+    throw InvalidArgument("samples",
+                          std::to_string(samples.width) + "x" + std::to_string(samples.height) +
+                              " pixels at " + std::to_string(x) + ", " + std::to_string(y),
+                          "inside of " + std::to_string(width_) + "x" + std::to_string(height_));
+  }
+  const std::size_t n = samples.size();
+  check_length("samples.shells", samples.shells.size(), static_cast<std::size_t>(shells_),
+               "those of the targets");
+  check_length("samples.diffuse", samples.diffuse.size(), n, "as many as samples.pixel");
+  std::size_t bad = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    check_range("samples.part", static_cast<int>(samples.part[i]), 0, parts_ - 1);
+    const glm::vec3 light = samples.fresnel[i] * incident_light(samples.shells, i);
+    if (!is_finite(light) || !is_finite(samples.diffuse[i])) {
+      ++bad;
+      continue;
+    }
+    const std::uint32_t column = samples.pixel[i] % static_cast<std::uint32_t>(samples.width);
+    const std::uint32_t row = samples.pixel[i] / static_cast<std::uint32_t>(samples.width);
+    const std::size_t pixel = (static_cast<std::size_t>(y) + row) * static_cast<std::size_t>(width_) +
+                              static_cast<std::size_t>(x) + column;
+    ++counts_[at(pixel, samples.part[i])];
+    reflected_[pixel] += glm::dvec3(light);
+    diffuse_[pixel] += glm::dvec3(samples.diffuse[i]);
+    for (std::size_t k = 0; k < samples.shells.size(); ++k) {
+      radiance_[at(pixel, samples.part[i]) * samples.shells.size() + k] +=
+          glm::dvec4(samples.shells[k].radiance[i]);
+    }
+  }
+  if (bad > 0) {
+    throw InvalidArgument("samples", "light that is not finite in " + std::to_string(bad) + " samples",
+                          "finite numbers");
+  }
+  samples_per_pixel_ = std::max(samples_per_pixel_, static_cast<double>(samples.samples_per_pixel));
+}
+
+std::uint32_t ViewTargets::count(std::size_t pixel) const {
+  std::uint32_t sum = 0;
+  for (int part = 0; part < parts_; ++part) sum += count(pixel, part);
+  return sum;
+}
+
+glm::vec3 ViewTargets::reflected(std::size_t pixel) const {
+  return glm::vec3(reflected_[pixel] / static_cast<double>(std::max(count(pixel), 1U)));
+}
+
+glm::vec3 ViewTargets::diffuse(std::size_t pixel) const {
+  return glm::vec3(diffuse_[pixel] / static_cast<double>(std::max(count(pixel), 1U)));
+}
+
+glm::vec4 ViewTargets::shell(std::size_t pixel, int part, int shell) const {
+  const std::size_t i = at(pixel, part) * static_cast<std::size_t>(shells_) + static_cast<std::size_t>(shell);
+  return glm::vec4(radiance_[i] / static_cast<double>(std::max(count(pixel, part), 1U)));
+}
+
+}  // namespace mirrorbake

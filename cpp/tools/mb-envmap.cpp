@@ -2,10 +2,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include <charconv>
 #include <cmath>
 #include <iostream>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <sstream>
@@ -16,6 +16,7 @@
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
+#include "envmap_command.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
@@ -33,68 +34,6 @@ namespace {
 
 using namespace mirrorbake;        // NOLINT(google-build-using-namespace): one program, one namespace
 using namespace mirrorbake::tool;  // NOLINT(google-build-using-namespace)
-
-// What every command that reads a map takes.
-struct Input {
-  std::string path;
-  std::string projection;
-  std::string layout = "automatic";
-  std::string convention = "mirrorbake";
-
-  void add_options(CLI::App& app, const std::string& name = "input") {
-    app.add_option(name, path,
-                   "EXR, HDR, TIFF, PNG, JPEG or KTX2; {} in the name stands for px, nx, py, ny, pz, nz")
-        ->required();
-  }
-  void add_details(CLI::App& app, const std::string& whose = "the input") {
-    app.add_option("--from", projection,
-                   "projection of " + whose +
-                       ": cube, latlong, dual_paraboloid, sphere_map, angular, fisheye:DEGREES "
-                       "(default: by the shape of the image)");
-    app.add_option("--from-layout", layout,
-                   "how faces share the image: strip, column, grid, cross, vertical_cross")
-        ->capture_default_str();
-    app.add_option("--from-convention", convention,
-                   "orientation of " + whose + ": mirrorbake, openexr, oiio, mitsuba, threejs, ktx2")
-        ->capture_default_str();
-  }
-  EnvMap load() const {
-    std::optional<Projection> given;
-    if (!projection.empty()) given = parse_projection(projection);
-    EnvMap map = load_envmap(path, given, parse_face_layout(layout));
-    return convention == "mirrorbake" ? map
-                                      : convert_convention(map, convention, ConventionWay::from_foreign);
-  }
-};
-
-struct Output {
-  std::string path;
-  std::string layout = "automatic";
-  std::string format = "automatic";
-
-  void add_options(CLI::App& app) {
-    app.add_option("-o,--output", path, "file to write; the extension decides the format")->required();
-    app.add_option("--layout", layout,
-                   "how faces share the image: strip, column, grid, cross, vertical_cross, files")
-        ->capture_default_str();
-    app.add_option("--format", format, "pixels in the file: automatic, half, float32, uint8, uint16")
-        ->capture_default_str();
-  }
-  // Before the work.
-  void check(const Projection& projection) const {
-    check_envmap_path(path, projection, parse_face_layout(layout), parse_pixel_format(format));
-  }
-  void save(const EnvMapView& map, bool json) const {
-    const SaveReport report = save_envmap(path, map, parse_face_layout(layout), parse_pixel_format(format));
-    warn_of_losses("mb-envmap", path, report);
-    if (!json) return;
-    std::cout << "{\"output\": " << json_string(path)
-              << ", \"projection\": " << json_string(to_string(map.layout.projection))
-              << ", \"width\": " << map.layout.width << ", \"height\": " << map.layout.height
-              << ", \"levels\": " << map.layout.levels << ", \"clamped_to_half\": " << report.clamped_to_half
-              << ", \"clipped\": " << report.clipped << "}\n";
-  }
-};
 
 void print_info(const Input& input, bool json) {
   const EnvMap map = input.load();
@@ -136,28 +75,6 @@ void print_info(const Input& input, bool json) {
               << " to " << high[c] << ", mean radiance over the sphere " << mean[c] << '\n';
   }
   if (bad > 0) std::cout << "  " << bad << " values are NaN or infinite\n";
-}
-
-struct Size {
-  int width = 0;
-  int height = 0;
-};
-
-// "256" or "512x256".
-Size parse_size(const std::string& text, const Projection& projection) {
-  Size size;
-  const char* end = text.data() + text.size();
-  auto [rest, error] = std::from_chars(text.data(), end, size.width);
-  if (error == std::errc() && rest == end) {
-    size.height = size.width;
-    if (natural_aspect(projection) == 2) size.width *= 2;
-    return size;
-  }
-  if (error == std::errc() && *rest == 'x') {
-    const auto second = std::from_chars(rest + 1, end, size.height);
-    if (second.ec == std::errc() && second.ptr == end) return size;
-  }
-  throw InvalidArgument("--size", text, "HEIGHT or WIDTHxHEIGHT in texels of a face");
 }
 
 struct Convert {
@@ -396,6 +313,8 @@ int run(int argc, char** argv) {
   second.add_options(*compare_command, "reference");
   first.add_details(*compare_command, "both maps");
 
+  const std::unique_ptr<EnvmapCommand> prefilter_command = add_prefilter(app);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -409,6 +328,7 @@ int run(int argc, char** argv) {
   if (*border_command) write_border(border_input.load(), border, border_output, json);
   if (*sample_command)
     print_samples(sample_input.load(), directions, parse_sample_filter(sample_filter), footprint, json);
+  if (prefilter_command->wanted()) prefilter_command->run(json);
   if (*compare_command) {
     second.projection = first.projection;
     second.layout = first.layout;

@@ -12,7 +12,10 @@ from programs import ROOT, find_program
 MANUAL = (ROOT / "docs" / "reference" / "command-line.md").read_text()
 COMMANDS = [
     *(f"mb-trace {command}" for command in ("beauty", "layers", "capture")),
-    *(f"mb-envmap {command}" for command in ("info", "convert", "mips", "border", "sample", "compare")),
+    *(
+        f"mb-envmap {command}"
+        for command in ("info", "convert", "mips", "border", "sample", "prefilter", "compare")
+    ),
     *(f"mb-fresnel {command}" for command in ("table", "plot", "metal", "report")),
     *(
         f"mirrorbake {command}"

@@ -13,8 +13,8 @@ namespace mirrorbake {
 SplitSum split_sum(double cosine, double alpha) {
   check_above("cosine", cosine, 0.0, 1.0);
   check_above("alpha", alpha, 0.0, 1.0);
-  constexpr int kPolar = 128;
-  constexpr int kAzimuth = 32;
+  constexpr int kPolar = 96;
+  constexpr int kAzimuth = 24;
   const double sine = std::sqrt(1.0 - cosine * cosine);
   const double a2 = alpha * alpha;
   SplitSum sum;
@@ -33,7 +33,8 @@ SplitSum split_sum(double cosine, double alpha) {
       const double visible = 0.5 / (n_l * std::sqrt(cosine * cosine * (1.0 - a2) + a2) +
                                     cosine * std::sqrt(n_l * n_l * (1.0 - a2) + a2));
       const double reflected = 4.0 * n_l * visible * v_h / cos_h * weight;
-      const double fresnel = std::pow(1.0 - v_h, 5.0);
+      const double grazing = 1.0 - v_h;
+      const double fresnel = grazing * grazing * grazing * grazing * grazing;
       sum.scale += (1.0 - fresnel) * reflected;
       sum.bias += fresnel * reflected;
     }

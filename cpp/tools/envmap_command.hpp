@@ -1,0 +1,119 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <charconv>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/envmap/conventions.hpp"
+#include "mirrorbake/envmap/envmap_io.hpp"
+#include "tool.hpp"
+
+/// What the commands of mb-envmap have in common.
+namespace mirrorbake::tool {
+
+/// What every command that reads a map takes.
+struct Input {
+  std::string path;
+  std::string projection;
+  std::string layout = "automatic";
+  std::string convention = "mirrorbake";
+
+  void add_options(CLI::App& app, const std::string& name = "input") {
+    app.add_option(name, path,
+                   "EXR, HDR, TIFF, PNG, JPEG or KTX2; {} in the name stands for px, nx, py, ny, pz, nz")
+        ->required();
+  }
+  void add_details(CLI::App& app, const std::string& whose = "the input") {
+    app.add_option("--from", projection,
+                   "projection of " + whose +
+                       ": cube, latlong, dual_paraboloid, sphere_map, angular, fisheye:DEGREES "
+                       "(default: by the shape of the image)");
+    app.add_option("--from-layout", layout,
+                   "how faces share the image: strip, column, grid, cross, vertical_cross")
+        ->capture_default_str();
+    app.add_option("--from-convention", convention,
+                   "orientation of " + whose + ": mirrorbake, openexr, oiio, mitsuba, threejs, ktx2")
+        ->capture_default_str();
+  }
+  EnvMap load() const {
+    std::optional<Projection> given;
+    if (!projection.empty()) given = parse_projection(projection);
+    EnvMap map = load_envmap(path, given, parse_face_layout(layout));
+    return convention == "mirrorbake" ? map
+                                      : convert_convention(map, convention, ConventionWay::from_foreign);
+  }
+};
+
+struct Output {
+  std::string path;
+  std::string layout = "automatic";
+  std::string format = "automatic";
+
+  void add_options(CLI::App& app) {
+    app.add_option("-o,--output", path, "file to write; the extension decides the format")->required();
+    app.add_option("--layout", layout,
+                   "how faces share the image: strip, column, grid, cross, vertical_cross, files")
+        ->capture_default_str();
+    app.add_option("--format", format, "pixels in the file: automatic, half, float32, uint8, uint16")
+        ->capture_default_str();
+  }
+  // Before the work.
+  void check(const Projection& projection) const {
+    check_envmap_path(path, projection, parse_face_layout(layout), parse_pixel_format(format));
+  }
+  void save(const EnvMapView& map, bool json) const {
+    const SaveReport report = save_envmap(path, map, parse_face_layout(layout), parse_pixel_format(format));
+    warn_of_losses("mb-envmap", path, report);
+    if (!json) return;
+    std::cout << "{\"output\": " << json_string(path)
+              << ", \"projection\": " << json_string(to_string(map.layout.projection))
+              << ", \"width\": " << map.layout.width << ", \"height\": " << map.layout.height
+              << ", \"levels\": " << map.layout.levels << ", \"clamped_to_half\": " << report.clamped_to_half
+              << ", \"clipped\": " << report.clipped << "}\n";
+  }
+};
+
+struct Size {
+  int width = 0;
+  int height = 0;
+};
+
+/// "256" or "512x256".
+inline Size parse_size(const std::string& text, const Projection& projection) {
+  Size size;
+  const char* end = text.data() + text.size();
+  auto [rest, error] = std::from_chars(text.data(), end, size.width);
+  if (error == std::errc() && rest == end) {
+    size.height = size.width;
+    if (natural_aspect(projection) == 2) size.width *= 2;
+    return size;
+  }
+  if (error == std::errc() && *rest == 'x') {
+    const auto second = std::from_chars(rest + 1, end, size.height);
+    if (second.ec == std::errc() && second.ptr == end) return size;
+  }
+  throw InvalidArgument("--size", text, "HEIGHT or WIDTHxHEIGHT in texels of a face");
+}
+
+/// A command with a file of its own: it adds itself to the program and runs if it was asked for.
+class EnvmapCommand {
+ public:
+  explicit EnvmapCommand(CLI::App* app) : app_(app) {}
+  EnvmapCommand(const EnvmapCommand&) = delete;
+  EnvmapCommand& operator=(const EnvmapCommand&) = delete;
+  virtual ~EnvmapCommand() = default;
+  bool wanted() const { return app_->parsed(); }
+  virtual void run(bool json) const = 0;
+
+ private:
+  CLI::App* app_;
+};
+
+std::unique_ptr<EnvmapCommand> add_prefilter(CLI::App& app);
+
+}  // namespace mirrorbake::tool

@@ -13,6 +13,7 @@ from mirrorbake.evaluate.metrics import (
     display_referred,
     flip,
     mean_or_none,
+    motion,
     psnr,
     sliding,
     ssim,
@@ -112,7 +113,7 @@ def test_equal_images_have_the_best_value_of_every_metric() -> None:
     assert ssim(image, image, everywhere) == pytest.approx(1.0)
     assert flip(image, image, everywhere) == pytest.approx(0.0, abs=1e-6)
     assert worst_error(image, image, everywhere) == 0.0
-    assert sliding((image, image), (image, image), everywhere) == 0.0
+    assert sliding((image, image), motion((image, image), everywhere)) == 0.0
 
 
 def test_every_metric_gets_worse_with_more_noise() -> None:
@@ -144,11 +145,11 @@ def test_sliding_is_the_difference_of_the_motions() -> None:
 
     frames = {pixels: moved(pixels) for pixels in (0.0, 0.5, 1.0, 2.0)}
     # What moves as it should slides by nothing; what stands still slides by all of the motion.
-    assert sliding((frames[0.0], frames[1.0]), (frames[0.0], frames[1.0]), everywhere) == 0.0
+    assert sliding((frames[0.0], frames[1.0]), motion((frames[0.0], frames[1.0]), everywhere)) == 0.0
     for pixels in (0.5, 1.0, 2.0):
-        still = sliding((frames[0.0], frames[0.0]), (frames[0.0], frames[pixels]), everywhere)
+        still = sliding((frames[0.0], frames[0.0]), motion((frames[0.0], frames[pixels]), everywhere))
         assert still == pytest.approx(pixels, rel=0.1)
-    half = sliding((frames[0.0], frames[0.5]), (frames[0.0], frames[1.0]), everywhere)
+    half = sliding((frames[0.0], frames[0.5]), motion((frames[0.0], frames[1.0]), everywhere))
     assert half == pytest.approx(0.5, rel=0.15)
 
 
@@ -156,7 +157,7 @@ def test_metrics_of_nothing_are_not_a_number() -> None:
     image, nothing = linear(picture(7)), np.zeros((64, 80), bool)
     for metric in (psnr, ssim, flip, worst_error):
         assert math.isnan(metric(image, image, nothing))
-    assert math.isnan(sliding((image, image), (image, image), nothing))
+    assert math.isnan(sliding((image, image), motion((image, image), nothing)))
     # No texture determines a motion on a plain wall.
     wall = np.full((64, 80, 3), 0.3, np.float32)
-    assert math.isnan(sliding((wall, wall), (wall, wall), ~nothing))
+    assert math.isnan(sliding((wall, wall), motion((wall, wall), ~nothing)))

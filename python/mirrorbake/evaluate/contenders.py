@@ -20,12 +20,29 @@ if TYPE_CHECKING:
     from mirrorbake.pem.opened import OpenedPem
     from mirrorbake.scene.parameters import Point
 
-RUN_TIMES = ("reference",)
-"""How contenders are drawn, in the order of the tables.
+RUN_TIMES: Mapping[str, _core.RunTimeModel] = {
+    "reference": _core.run_time_model("Reference"),
+    "web": _core.run_time_model("Web"),
+    "web1": _core.run_time_model("Web1"),
+}
+"""How contenders are drawn, in the order of the tables: with 16, 4 (as the web page does) or 1 lookup per
+pixel."""
 
-`reference` takes as many lookups per pixel as the PEM's targets have samples, each of a quarter of a pixel
-(`infer.footprint_scale`).
-"""
+MOST_KEPT = 16
+"""Samples whose single-layer maps are kept in memory: views at the same ones come apart in an evaluation."""
+
+MAIN_RUN_TIME = "reference"
+"""The one that pictures and studies show."""
+
+
+def run_time_of(pem: OpenedPem, name: str) -> _core.RunTimeModel:
+    """The run time of a name, one of `RUN_TIMES`.
+
+    Maps that were inferred for isotropic lookups of the traced samples have those as their reference: read
+    anisotropically they would be sharper than what they were fitted to.
+    """
+    own = pem.run_time.model
+    return own if name == MAIN_RUN_TIME and own.filter == "trilinear" else RUN_TIMES[name]
 
 
 @dataclass
@@ -42,9 +59,10 @@ class Frame:
         """Where a run time's lookups see the reflector, by one of `RUN_TIMES`."""
         if run_time not in self._samples:
             stage = self.pem.stage.at(self.view.point)
-            options = options_of(stage, stage.options.samples_per_pixel, stage.config.trace.seed, self.window)
+            places = run_time_of(self.pem, run_time).places
+            options = options_of(stage, len(places), stage.config.trace.seed, self.window)
             self._samples[run_time] = stage.tracer.trace_visibility(
-                self.view.camera, stage.built.reflector, options
+                self.view.camera, stage.built.reflector, options, places
             )
         return self._samples[run_time]
 
@@ -79,12 +97,14 @@ def contenders_of(pem: OpenedPem) -> dict[str, Contender]:
     """
 
     def stored(name: str) -> Callable[[Frame, str], FloatArray]:
-        return lambda frame, run_time: pem.run_time.render(name, frame.view.point, frame.samples(run_time))
+        return lambda frame, run_time: pem.run_time.render(
+            name, frame.view.point, frame.samples(run_time), run_time_of(pem, run_time)
+        )
 
     found = {"pem": stored("pem")}
     if len(pem.space) > 1:
         found["pem_nearest"] = lambda frame, run_time: pem.run_time.render(
-            "pem", nearest_sample(pem, frame.view.point), frame.samples(run_time)
+            "pem", nearest_sample(pem, frame.view.point), frame.samples(run_time), run_time_of(pem, run_time)
         )
     found["pem_single_infinite"] = SingleLayer(pem).render
     found["static_infinite"] = stored("static_infinite")
@@ -126,13 +146,19 @@ class SingleLayer:
     def render(self, frame: Frame, run_time: str) -> FloatArray:
         """Draw the reflector: radiance (H, W, 3). Between two samples their maps are blended, as a PEM's."""
         shares = self._pem.space.neighbours(frame.view.point)
-        self._maps = {i: self._maps.get(i) or self._infer(i) for i, _ in shares}
+        for index, _ in shares:
+            if index not in self._maps:
+                if len(self._maps) >= MOST_KEPT:
+                    self._maps.clear()
+                self._maps[index] = self._infer(index)
         maps = [
             blended([(self._maps[i][part], weight) for i, weight in shares])
             for part in range(len(self._pem.store.header.parts))
         ]
         parts = [[_core.ShellMap(self._proxy, self._layout, texels)] for texels in maps]
-        return self._pem.run_time.render_parts(parts, frame.samples(run_time))
+        return self._pem.run_time.render_parts(
+            parts, frame.samples(run_time), run_time_of(self._pem, run_time)
+        )
 
     def _infer(self, index: int) -> list[FloatArray]:
         stage, header = self._pem.stage, self._pem.store.header

@@ -10,8 +10,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from mirrorbake.errors import InputError
-from mirrorbake.evaluate.contenders import CONTENDERS, RUN_TIMES, Frame, contenders_of
-from mirrorbake.evaluate.metrics import DISPLAY_TRANSFORM, flip, mean_or_none, sliding, ssim, worst_error
+from mirrorbake.evaluate.contenders import CONTENDERS, MAIN_RUN_TIME, RUN_TIMES, Frame, contenders_of
+from mirrorbake.evaluate.metrics import (
+    DISPLAY_TRANSFORM,
+    flip,
+    mean_or_none,
+    motion,
+    sliding,
+    ssim,
+    worst_error,
+)
 from mirrorbake.evaluate.places import PLACES, View, choose_views
 from mirrorbake.evaluate.references import (
     MARGIN_DECIBELS,
@@ -34,6 +42,7 @@ if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
     from mirrorbake.bake.bake import ProgressReport
     from mirrorbake.evaluate.contenders import Contender
+    from mirrorbake.evaluate.metrics import Motion
     from mirrorbake.scene.parameters import Point
     from mirrorbake.scene.stage import Stage
 
@@ -84,7 +93,7 @@ class Evaluation:
     """Whether they are in metrics.json."""
 
     def mean(
-        self, contender: str, place: str, *, run_time: str = RUN_TIMES[0], metric: str = "psnr"
+        self, contender: str, place: str, *, run_time: str = MAIN_RUN_TIME, metric: str = "psnr"
     ) -> float | None:
         """Mean of a metric over the views of a place (PSNR: of the dB); None if there are none."""
         return mean_or_none(
@@ -285,6 +294,7 @@ def _notes(figures: list[ViewFigures], unseen: list[str], cache: ReferenceCache)
 def _figures(seen: SeenView, before: SeenView | None) -> ViewFigures:
     reference = seen.reference
     whole, mask = reference.images.beauty, reference.mask
+    pair = None if before is None else _Pair(before, seen)
     metrics: dict[str, Figures] = {metric: {} for metric in METRICS}
     for contender, row in seen.pictures.items():
         for metric in METRICS:
@@ -296,7 +306,7 @@ def _figures(seen: SeenView, before: SeenView | None) -> ViewFigures:
                 "ssim": ssim(picture, whole, mask),
                 "flip": flip(picture, whole, mask),
                 "worst": worst_error(light, reference.images.object, mask),
-                "sliding": _sliding(seen, before, contender, run_time),
+                "sliding": None if pair is None else pair.sliding(contender, run_time),
             }
             for metric, value in values.items():
                 metrics[metric][contender][run_time] = value
@@ -306,27 +316,28 @@ def _figures(seen: SeenView, before: SeenView | None) -> ViewFigures:
     )
 
 
-def _sliding(seen: SeenView, before: SeenView | None, contender: str, run_time: str) -> float | None:
-    if before is None:
-        return None
-    windows = (before.reference.window, seen.reference.window)
-    left, top = (min(window[axis] for window in windows) for axis in (0, 1))
-    width, height = (max(window[axis] + window[axis + 2] for window in windows) for axis in (0, 1))
-    shape = (height - top, width - left)
+class _Pair:
+    """Two neighbouring views, placed in a part of the frame that holds both their windows."""
 
-    def placed(image: NDArray[np.generic], window: tuple[int, int, int, int]) -> FloatArray:
-        return _placed(image, window[0] - left, window[1] - top, shape)
+    def __init__(self, before: SeenView, seen: SeenView) -> None:
+        self._views = (before, seen)
+        windows = [view.reference.window for view in self._views]
+        self._left, self._top = (min(window[axis] for window in windows) for axis in (0, 1))
+        right, bottom = (max(window[axis] + window[axis + 2] for window in windows) for axis in (0, 1))
+        self._shape = (bottom - self._top, right - self._left)
+        true = [self._placed(view, view.reference.images.beauty) for view in self._views]
+        masks = [self._placed(view, view.reference.mask) > 0 for view in self._views]
+        self._motion: Motion = motion((true[0], true[1]), masks[0] & masks[1])
 
-    masks = [placed(s.reference.mask, s.reference.window) > 0 for s in (before, seen)]
-    true = [placed(s.reference.images.beauty, s.reference.window) for s in (before, seen)]
-    drawn = [
-        placed(s.reference.images.composite(s.pictures[contender][run_time]), s.reference.window)
-        for s in (before, seen)
-    ]
-    return sliding((drawn[0], drawn[1]), (true[0], true[1]), masks[0] & masks[1])
+    def sliding(self, contender: str, run_time: str) -> float:
+        drawn = [
+            self._placed(view, view.reference.images.composite(view.pictures[contender][run_time]))
+            for view in self._views
+        ]
+        return sliding((drawn[0], drawn[1]), self._motion)
 
-
-def _placed(image: NDArray[np.generic], left: int, top: int, shape: tuple[int, int]) -> FloatArray:
-    canvas = np.zeros((*shape, *image.shape[2:]), np.float32)
-    canvas[top : top + image.shape[0], left : left + image.shape[1]] = image
-    return canvas
+    def _placed(self, view: SeenView, image: NDArray[np.generic]) -> FloatArray:
+        left, top = view.reference.window[0] - self._left, view.reference.window[1] - self._top
+        canvas = np.zeros((*self._shape, *image.shape[2:]), np.float32)
+        canvas[top : top + image.shape[0], left : left + image.shape[1]] = image
+        return canvas

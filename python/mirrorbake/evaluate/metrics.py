@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import flip_evaluator
@@ -159,39 +160,59 @@ def flip(image: FloatArray, reference: FloatArray, mask: Mask) -> float:
     return float(np.asarray(error).reshape(mask.shape)[mask].mean())
 
 
-def sliding(
-    frames: tuple[FloatArray, FloatArray], references: tuple[FloatArray, FloatArray], mask: Mask
-) -> float:
-    """Error of the motion between two neighbouring frames: the "wobble" of reflections ([PEM] §6).
+@dataclass(frozen=True)
+class Motion:
+    """How what is seen moves between two neighbouring frames, and where that can be told.
 
-    The motion of what is seen is found in both pairs of frames by optical flow (Le Besnerais and Champagnat,
-    Dense optical flow by iterative local window registration, ICIP 2005). Pixels count as far as their
-    surroundings determine a motion: by the smaller eigenvalue of the structure tensor of the reference.
+    Found by optical flow (Le Besnerais and Champagnat, Dense optical flow by iterative local window
+    registration, ICIP 2005).
+    """
+
+    flow: NDArray[np.float64]
+    """(2, H, W): pixels down and to the right."""
+    weight: NDArray[np.float64]
+    """(H, W): how well its surroundings determine a pixel's motion, the smaller eigenvalue of the structure
+    tensor; 0 outside of the mask and near its edge."""
+
+
+def motion(frames: tuple[FloatArray, FloatArray], mask: Mask) -> Motion:
+    """Find the motion between two frames.
 
     Parameters
     ----------
-    frames, references
-        Two frames each, scene-linear radiance (H, W, 3), of the same cameras.
+    frames
+        Scene-linear radiance (H, W, 3).
     mask
         Pixels of the object in both frames, shape (H, W).
+    """
+    inside = binary_erosion(mask, iterations=FLOW_RADIUS)
+    a, b = (display_referred(frame) @ _LUMA for frame in frames)
+    tensor = structure_tensor(a, sigma=FLOW_RADIUS / 2, mode="nearest")
+    weight = np.where(inside, structure_tensor_eigenvalues(tensor)[1], 0.0)
+    flow = optical_flow_ilk(a, b, radius=FLOW_RADIUS) if inside.any() else np.zeros((2, *mask.shape))
+    return Motion(flow, weight)
+
+
+def sliding(frames: tuple[FloatArray, FloatArray], true: Motion) -> float:
+    """Error of the motion between two neighbouring frames: the "wobble" of reflections ([PEM] §6).
+
+    Parameters
+    ----------
+    frames
+        Scene-linear radiance (H, W, 3).
+    true
+        Motion between the ray-traced frames of the same cameras.
 
     Returns
     -------
     float
         RMS of the difference of the motions, pixels per frame; NaN where no pixel determines one.
     """
-    inside = binary_erosion(mask, iterations=FLOW_RADIUS)
-    if not inside.any():
+    if true.weight.max(initial=0.0) < _LEAST_TEXTURE:
         return math.nan
-    a, b = (display_referred(frame) @ _LUMA for frame in references)
-    tensor = structure_tensor(a, sigma=FLOW_RADIUS / 2, mode="nearest")
-    weight = np.where(inside, structure_tensor_eigenvalues(tensor)[1], 0.0)
-    if weight.max() < _LEAST_TEXTURE:
-        return math.nan
-    true_motion = optical_flow_ilk(a, b, radius=FLOW_RADIUS)
-    motion = optical_flow_ilk(*(display_referred(frame) @ _LUMA for frame in frames), radius=FLOW_RADIUS)
-    squared = np.sum((motion - true_motion) ** 2, axis=0)
-    return float(np.sqrt(np.average(squared, weights=weight)))
+    a, b = (display_referred(frame) @ _LUMA for frame in frames)
+    difference = optical_flow_ilk(a, b, radius=FLOW_RADIUS) - true.flow
+    return float(np.sqrt(np.average(np.sum(difference**2, axis=0), weights=true.weight)))
 
 
 _LEAST_TEXTURE = 1e-12

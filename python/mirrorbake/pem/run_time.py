@@ -65,11 +65,22 @@ class RunTime:
         self._views: dict[int, dict[tuple[str, str], FloatArray]] = {}
 
     @property
+    def model(self) -> _core.RunTimeModel:
+        """How the maps were read when they were inferred."""
+        return self._options
+
+    @property
     def has_static_proxy(self) -> bool:
         """Whether the static map on the distant layer's geometry is a contender: it is not at infinity."""
         return self._header.static["proxy"] is not None
 
-    def render(self, contender: str, point: PointLike, samples: _core.SurfaceSamples) -> FloatArray:
+    def render(
+        self,
+        contender: str,
+        point: PointLike,
+        samples: _core.SurfaceSamples,
+        model: _core.RunTimeModel | None = None,
+    ) -> FloatArray:
         """Draw the reflector.
 
         Parameters
@@ -79,7 +90,9 @@ class RunTime:
         point
             Of the parameter space; between nodes the PEM blends their maps by multilinear weights.
         samples
-            Where the camera of the point sees the reflector.
+            Where the camera of the point sees the reflector, at the places of the run time.
+        model
+            How maps are read; None: as they were when they were inferred.
 
         Returns
         -------
@@ -90,14 +103,19 @@ class RunTime:
             parts = self._pem_parts(self._header.space.neighbours(point))
         else:
             parts = self._static_parts("infinite" if contender == "static_infinite" else "proxy")
-        return self.render_parts(parts, samples)
+        return self.render_parts(parts, samples, model)
 
-    def render_parts(self, parts: list[list[_core.ShellMap]], samples: _core.SurfaceSamples) -> FloatArray:
+    def render_parts(
+        self,
+        parts: list[list[_core.ShellMap]],
+        samples: _core.SurfaceSamples,
+        model: _core.RunTimeModel | None = None,
+    ) -> FloatArray:
         """Draw the reflector from maps of each part, with the PEM's diffuse layer; returns as `render`."""
         diffuse = None
         if self._irradiance is not None:
             diffuse = _core.diffuse_from_irradiance(samples, self.triangles, self._irradiance)
-        image = _core.render_reflector(samples, parts, diffuse, self._options)
+        image = _core.render_reflector(samples, parts, diffuse, model or self._options)
         coverage = image[..., 3:]
         return np.divide(image[..., :3], coverage, out=np.zeros_like(image[..., :3]), where=coverage > 0.0)
 

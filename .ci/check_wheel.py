@@ -25,6 +25,8 @@ def main(wheel: Path) -> None:
             "mirrorbake/py.typed",
             "mirrorbake/_core.pyi",
             "mirrorbake/libmirrorbake_openimageio.so",
+            "mirrorbake/viewer/page/viewer.js",
+            "mirrorbake/viewer/page/viewer.css",
         ):
             if needed not in names:
                 sys.exit(f"{wheel}: lacks {needed}")

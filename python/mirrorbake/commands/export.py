@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from mirrorbake.pem.export.map_sets import MapSet
+    from mirrorbake.pem.export.web import WebOptions
 
 
 @reports_errors
@@ -83,11 +84,33 @@ def export_command(
     all_samples: Annotated[
         bool, typer.Option("--all", help="The static maps and those of all samples.")
     ] = False,
+    web: Annotated[
+        Path | None,
+        typer.Option("--web", metavar="OUT", help="Folder for a page that any web server can host."),
+    ] = None,
+    single_file: Annotated[
+        bool, typer.Option("--single-file", help="Of --web: OUT is one HTML file, which works from disk.")
+    ] = False,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="Of --web: images in WebP without loss, not AVIF.")
+    ] = False,
+    quality: Annotated[
+        int, typer.Option("--quality", min=1, max=100, metavar="N", help="Of --web: of AVIF, 1 to 100.")
+    ] = 90,
+    fallback: Annotated[
+        bool,
+        typer.Option(
+            help="Of --web: exact images as well, for browsers that show AVIF wrongly; not in a single file."
+        ),
+    ] = True,
+    references: Annotated[
+        bool, typer.Option(help="Of --web: the ray-traced pictures of the samples, to compare with.")
+    ] = True,
     threads: Threads = 0,
 ) -> None:
-    """Write a PEM for other programs: its maps, a glTF file, a film, pictures."""
-    if maps is None and glb is None and video is None and stills is None:
-        raise typer.BadParameter("nothing to write: give --maps, --glb, --video or --stills")
+    """Write a PEM for other programs: its maps, a glTF file, a film, pictures, a page that draws it."""
+    if all(out is None for out in (maps, glb, video, stills, web)):
+        raise typer.BadParameter("nothing to write: give --maps, --glb, --video, --stills or --web")
     if sample is not None and all_samples:
         raise typer.BadParameter("--sample and --all exclude each other")
     with _core.ThreadLimit(threads):
@@ -97,6 +120,12 @@ def export_command(
             _export_glb(directory, glb, sample, all_samples)
         if video is not None or stills is not None:
             _export_pictures(directory, video, stills, frames, fps, exposure, tone)
+        if web is not None:
+            from mirrorbake.pem.export.images import ImageFormat
+            from mirrorbake.pem.export.web import WebOptions
+
+            options = WebOptions(ImageFormat(exact, quality), fallback and not single_file, references)
+            _export_page(directory, web, options, single_file)
 
 
 def _export_maps(
@@ -182,6 +211,21 @@ def _export_pictures(
     for out in (video, stills):
         if out is not None:
             _print_message(f"wrote {out}")
+
+
+def _export_page(directory: Path, out: Path, options: WebOptions, single_file: bool) -> None:
+    from mirrorbake.pem.export.source import export_source
+    from mirrorbake.pem.export.web import WebPem
+    from mirrorbake.pem.opened import open_pem
+    from mirrorbake.viewer.export import write_folder, write_single_file
+
+    source = export_source(open_pem(directory))
+    write = write_single_file if single_file else write_folder
+    with progress() as add_bar:
+        written = write(WebPem(source, options), source.title, out, add_bar("export"))
+    for note in source.notes:
+        _print_message(f"note: {note}")
+    _print_message(f"wrote {out}, {written / 1e6:.2f} MB")
 
 
 def _print_message(text: str) -> None:

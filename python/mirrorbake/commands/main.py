@@ -19,6 +19,7 @@ from mirrorbake.commands.export import export_command
 from mirrorbake.commands.render import render_command
 from mirrorbake.commands.report import report_command
 from mirrorbake.commands.study import app as study_app
+from mirrorbake.commands.view import view_command
 
 app = typer.Typer(
     name="mirrorbake",
@@ -33,6 +34,7 @@ app.command("evaluate")(evaluate_command)
 app.command("report")(report_command)
 app.command("render")(render_command)
 app.command("export")(export_command)
+app.command("view")(view_command)
 app.command("demo")(demo_command)
 app.add_typer(study_app, name="study")
 

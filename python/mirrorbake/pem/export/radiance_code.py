@@ -43,17 +43,19 @@ class RadianceCode:
         """Codes of radiance of any shape; what the code cannot hold is clamped to its ends."""
         logarithm = np.log2(np.maximum(radiance, 0.0).astype(np.float64) + self.epsilon)
         code = np.rint((logarithm - self.low) * (255.0 / (self.high - self.low)))
-        return np.clip(code, 0.0, 255.0).astype(np.uint8)
+        codes: NDArray[np.uint8] = np.clip(code, 0.0, 255.0).astype(np.uint8)
+        return codes
 
     def decode(self, codes: NDArray[np.uint8]) -> FloatArray:
         """Radiance that codes stand for, float32."""
-        return self.table()[codes]
+        radiance: FloatArray = self.table()[codes]
+        return radiance
 
     def table(self) -> FloatArray:
         """Radiance of each of the 256 codes, float32."""
         logarithm = self.low + np.arange(256) * ((self.high - self.low) / 255.0)
-        values: FloatArray = np.maximum(np.exp2(logarithm) - self.epsilon, 0.0).astype(np.float32)
-        return values
+        radiance: FloatArray = np.maximum(np.exp2(logarithm) - self.epsilon, 0.0).astype(np.float32)
+        return radiance
 
 
 def atlas_shape(size: int) -> tuple[int, int]:
@@ -81,7 +83,7 @@ def level_place(size: int, level: int) -> tuple[int, int]:
     return 2 * size, sum(3 * (size >> finer) for finer in range(1, level))
 
 
-def to_atlas(pyramid: FloatArray | NDArray[np.uint8], size: int) -> NDArray[np.generic]:
+def to_atlas(pyramid: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
     """Put a pyramid into its atlas.
 
     Parameters
@@ -111,7 +113,7 @@ def to_atlas(pyramid: FloatArray | NDArray[np.uint8], size: int) -> NDArray[np.g
     return atlas
 
 
-def from_atlas(atlas: NDArray[np.generic], size: int) -> NDArray[np.generic]:
+def from_atlas(atlas: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
     """Inverse of `to_atlas`."""
     faces = []
     for level in range(size.bit_length()):

@@ -1,0 +1,239 @@
+"""A PEM as files for a web page: a manifest in JSON, images, and the mesh (spec section 10).
+
+`docs/reference/web-format.md` describes the files.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.pem.export.images import ImageFormat, probe_image
+from mirrorbake.pem.export.mesh_file import write_mesh
+from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.export.source import ExportSource
+
+FORMAT_NAME = "mirrorbake-web"
+FORMAT_VERSION = 1
+MANIFEST_NAME = "manifest.json"
+
+PROBED_SAMPLES = 16
+"""Samples that are read to find the range of the radiance; brighter texels of others are clamped."""
+
+
+@dataclass(frozen=True)
+class WebOptions:
+    """What `web_files` writes."""
+
+    format: ImageFormat = field(default_factory=lambda: ImageFormat(exact=False))
+    fallback: bool = True
+    """Also write images without loss, which the page takes if a browser shows the others wrongly."""
+    stills: bool = True
+    """The ray-traced pictures of the samples, to compare with."""
+
+    @property
+    def has_fallback(self) -> bool:
+        """Whether there are images without loss beside lossy ones."""
+        return self.fallback and not self.format.exact
+
+
+class WebPem:
+    """The files of a PEM on the web, made one by one when they are asked for.
+
+    >>> def first_picture(pem: WebPem) -> int:  # bytes until there is one
+    ...     return sum(len(pem.read(name)) for name in pem.names[:5])
+    """
+
+    def __init__(self, source: ExportSource, options: WebOptions | None = None) -> None:
+        self._source = source
+        self._options = options or WebOptions()
+        self._code = _code_of(source)
+        self._makers: dict[str, Callable[[], bytes]] = {}
+        self._first = nearest_to_middle(source.parameters)
+        self._collect()
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all files, with slashes, in the order in which a page wants them; the manifest first."""
+        return list(self._makers)
+
+    def read(self, name: str) -> bytes:
+        """Bytes of a file.
+
+        Raises
+        ------
+        KeyError
+            There is no such file.
+        StoreError
+            The PEM is damaged.
+        """
+        return self._makers[name]()
+
+    def _collect(self) -> None:
+        source, options, code = self._source, self._options, self._code
+        form = options.format
+        mesh, layout = write_mesh(source.mesh, len(source.parts))
+        probe = form.encode(probe_image())
+        manifest = json.dumps(self._manifest(layout, probe), separators=(",", ":")) + "\n"
+        self._makers[MANIFEST_NAME] = manifest.encode
+        self._makers["poster.avif"] = self._poster
+        self._makers["probe" + form.suffix] = lambda: probe
+        self._makers["mesh.bin.gz"] = lambda: mesh
+        self._add("static/capture", lambda: to_atlas(code.encode(source.static), source.static_size))
+        # The sample that is shown first, then outwards from it.
+        for i in sorted(range(len(source.parameters)), key=lambda i: abs(i - self._first)):
+            for p, part in enumerate(source.parts):
+                for s, shell in enumerate(part.shells):
+                    name = _map_name(i, p, s)
+                    self._add(name, partial(self._radiance, i, p, s))
+                    if not shell.opaque:
+                        self._add(name + ".alpha", partial(self._alpha, i, p, s))
+        if options.stills:
+            for i in range(len(source.parameters)):
+                self._add(_still_name(i), partial(self._still, i))
+
+    def _add(self, name: str, pixels: Callable[[], NDArray[np.uint8]]) -> None:
+        form, exact = self._options.format, ImageFormat(exact=True)
+        self._makers[name + form.suffix] = lambda: form.encode(pixels())
+        if self._options.has_fallback:
+            self._makers[f"exact/{name}{exact.suffix}"] = lambda: exact.encode(pixels())
+
+    def _poster(self) -> bytes:
+        return ImageFormat(exact=False, quality=70).encode(display_codes(self._source.still(self._first)))
+
+    def _radiance(self, sample: int, part: int, shell: int) -> NDArray[np.uint8]:
+        pyramid = self._source.pyramid(sample, part, shell)
+        return to_atlas(self._code.encode(pyramid[:, :3]), self._source.parts[part].shells[shell].size)
+
+    def _alpha(self, sample: int, part: int, shell: int) -> NDArray[np.uint8]:
+        pyramid = self._source.pyramid(sample, part, shell)
+        alpha = np.rint(np.clip(pyramid[:, 3:4], 0.0, 1.0) * 255.0).astype(np.uint8)
+        return to_atlas(alpha, self._source.parts[part].shells[shell].size)[..., 0]
+
+    def _still(self, sample: int) -> NDArray[np.uint8]:
+        return self._code.encode(self._source.still(sample))
+
+    def _manifest(self, mesh: dict[str, Any], probe: bytes) -> dict[str, Any]:
+        source, form = self._source, self._options.format
+        return {
+            "format": FORMAT_NAME,
+            "version": FORMAT_VERSION,
+            "library": _core.version(),
+            "title": source.title,
+            "notes": list(source.notes),
+            "runTime": source.run_time,
+            "camera": source.camera,
+            "material": source.material,
+            "radiance": {"low": self._code.low, "high": self._code.high, "epsilon": self._code.epsilon},
+            "images": {
+                "suffix": form.suffix,
+                "type": form.media_type,
+                "exact": form.exact,
+                "fallback": self._options.has_fallback,
+            },
+            "probe": {
+                "file": "probe" + form.suffix,
+                # A lossy image is not the one that was encoded, but everybody decodes the same.
+                "colours": form.decode(probe)[4, 4::8].tolist(),
+            },
+            "poster": {"file": "poster.avif", "type": "image/avif"},
+            "mesh": {"file": "mesh.bin.gz", **mesh},
+            "parts": [
+                {
+                    "name": part.name,
+                    "shells": [
+                        {"name": s.name, "size": s.size, "opaque": s.opaque, "proxy": s.proxy}
+                        for s in part.shells
+                    ],
+                }
+                for part in source.parts
+            ],
+            "static": {"image": "static/capture", "size": source.static_size, "proxy": source.static_proxy},
+            "samples": [self._sample(i) for i in range(len(source.parameters))],
+            "first": self._first,
+        }
+
+    def _sample(self, i: int) -> dict[str, Any]:
+        maps = [
+            [
+                {"radiance": name, "alpha": None if shell.opaque else name + ".alpha"}
+                for s, shell in enumerate(part.shells)
+                for name in [_map_name(i, p, s)]
+            ]
+            for p, part in enumerate(self._source.parts)
+        ]
+        still = _still_name(i) if self._options.stills else None
+        return {"parameter": [self._source.parameters[i]], "maps": maps, "still": still}
+
+
+def _map_name(sample: int, part: int, shell: int) -> str:
+    return f"samples/{sample:05d}/{part}.{shell}"
+
+
+def _still_name(sample: int) -> str:
+    return f"samples/{sample:05d}/still"
+
+
+def nearest_to_middle(parameters: tuple[float, ...]) -> int:
+    """Return the sample that the page shows first: the one in the middle of the arc."""
+    middle = 0.5 * (parameters[0] + parameters[-1])
+    return min(range(len(parameters)), key=lambda i: abs(parameters[i] - middle))
+
+
+def display_codes(radiance: FloatArray) -> NDArray[np.uint8]:
+    """Scene-linear radiance as the page shows it, 8-bit sRGB after Khronos' neutral tone mapping."""
+    encoded = _srgb(neutral_tone_map(radiance))
+    codes: NDArray[np.uint8] = np.rint(255.0 * encoded).astype(np.uint8)
+    return codes
+
+
+def _srgb(linear: FloatArray) -> FloatArray:
+    clipped = np.clip(linear, 0.0, 1.0)
+    return np.where(
+        clipped <= 0.0031308, 12.92 * clipped, 1.055 * np.maximum(clipped, 1e-9) ** (1.0 / 2.4) - 0.055
+    )
+
+
+def neutral_tone_map(radiance: FloatArray) -> FloatArray:
+    """Khronos' PBR Neutral tone mapper, (..., 3) to (..., 3) in [0, 1].
+
+    Khronos PBR Neutral Tone Mapper, specification 1.0, 2024.
+    """
+    start, desaturation = 0.8 - 0.04, 0.15
+    colour = np.maximum(radiance.astype(np.float32), 0.0)
+    lowest = colour.min(axis=-1, keepdims=True)
+    offset = np.where(lowest < 0.08, lowest - 6.25 * lowest * lowest, 0.04)
+    colour = colour - offset
+    peak = colour.max(axis=-1, keepdims=True)
+    d = 1.0 - start
+    new_peak = 1.0 - d * d / np.maximum(peak + d - start, 1e-6)
+    g = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0)
+    mapped = colour * new_peak / np.maximum(peak, 1e-6)
+    mapped = mapped * (1.0 - g) + new_peak * g
+    return np.where(peak < start, colour, mapped).astype(np.float32)
+
+
+def _code_of(source: ExportSource) -> RadianceCode:
+    """Return a code that holds the radiance of the maps, of at most `PROBED_SAMPLES` samples."""
+    count = len(source.parameters)
+    probed = np.unique(np.linspace(0, count - 1, min(count, PROBED_SAMPLES)).round().astype(int))
+    bright, largest = [], float(source.static.max())
+    for i in probed:
+        for p, part in enumerate(source.parts):
+            for s, shell in enumerate(part.shells):
+                finest = source.pyramid(int(i), p, s)[: 6 * shell.size * shell.size, :3]
+                bright.append(float(np.percentile(finest[::7], 99.0)))
+                largest = max(largest, float(finest.max()))
+    return RadianceCode.for_range(float(np.median(bright)), largest)

@@ -1,0 +1,1 @@
+"""The page that draws a PEM in a browser, and the server that shows it."""

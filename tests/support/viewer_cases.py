@@ -1,0 +1,288 @@
+"""Small PEMs for the tests of the page, with the pictures that the C++ renderer draws of them.
+
+    python tests/support/viewer_cases.py OUT
+
+writes a folder for each case, synthetic maps on a kind of proxy: the files of a web export, and
+`reference.json` beside `reference-K.f32`, float32 RGBA pictures from the top left corner: light, and coverage
+in alpha.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.pem.export.images import ImageFormat
+from mirrorbake.pem.export.mesh_file import ReflectorMesh
+from mirrorbake.pem.export.radiance_code import RadianceCode
+from mirrorbake.pem.export.source import ExportSource, Part, Shell
+from mirrorbake.pem.export.web import WebOptions, WebPem
+from mirrorbake.proxy import proxy_to_attributes
+from mirrorbake.viewer.export import write_folder
+
+if TYPE_CHECKING:
+    from mirrorbake.arrays import FloatArray
+
+MAP_SIZE = 32
+PLACES = [(0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)]
+FOOTPRINT = 0.5
+WIDTH, HEIGHT, FOV = 320, 240, 30.0
+DISTANCE, ELEVATION = 0.6, 20.0
+PARAMETERS = (0.0, 0.5, 1.0)
+ARC_DEGREES = 20.0
+TURNED = [[0.8, 0.0, -0.6], [0.0, 1.0, 0.0], [0.6, 0.0, 0.8]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One PEM."""
+
+    name: str
+    distant: _core.Proxy
+    local: _core.Proxy
+    fresnel: _core.Fresnel
+    coated: bool = False
+
+
+def cases() -> list[Case]:
+    """Every proxy as the distant shell's, every model of reflectance."""
+    origin = (0.02, 0.1, -0.03)
+    local = _core.Proxy.ellipsoid(
+        (0.0, 0.1, 0.0), (0.2, 0.12, 0.2), (0.0, 0.1, 0.0), np.eye(3, dtype=np.float32)
+    )
+    turned_local = _core.Proxy.ellipsoid(
+        (0.0, 0.1, 0.0), (0.25, 0.12, 0.19), (0.0, 0.1, 0.0), np.array(TURNED, np.float32)
+    )
+    straight, turned = np.eye(3, dtype=np.float32), np.array(TURNED, np.float32)
+    model = _core.FresnelModel
+    schlick = _core.Fresnel(model=model.schlick, r0=(0.9, 0.7, 0.5))
+    return [
+        Case("infinite", _core.Proxy.infinite(origin), local, schlick),
+        Case("box", _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, straight), local, schlick),
+        Case(
+            "rotated-box",
+            _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, turned),
+            turned_local,
+            _core.Fresnel(model=model.dielectric, eta=(1.5, 1.6, 1.7)),
+            coated=True,
+        ),
+        Case(
+            "ellipsoid",
+            _core.Proxy.ellipsoid((0, 0.5, 0), (3.0, 1.5, 2.0), origin, turned),
+            local,
+            _core.Fresnel(model=model.conductor, eta=(0.2, 0.9, 1.3), k=(3.9, 2.5, 2.2)),
+        ),
+        Case("sphere", _core.Proxy.ellipsoid((0, 0.5, 0), (2.0, 2.0, 2.0), origin, straight), local, schlick),
+        Case(
+            "hemisphere",
+            _core.Proxy.hemisphere((0, -0.05, 0), 2.0, origin, turned),
+            local,
+            _core.Fresnel(model=model.constant, r0=(0.8, 0.8, 0.8)),
+        ),
+    ]
+
+
+def _maps(seed: int, channels: int) -> FloatArray:
+    """A pyramid of smooth colours with some noise on every level of its own: wrong levels are seen."""
+    random = np.random.default_rng(seed)
+    levels = []
+    phase = random.uniform(0.0, 2.0 * math.pi, (channels, 3))
+    for level in range(MAP_SIZE.bit_length()):
+        n = MAP_SIZE >> level
+        centres = (np.arange(n) + 0.5) / n
+        faces = np.arange(6)
+        f, t, s = np.meshgrid(faces, centres, centres, indexing="ij")
+        for_all = [
+            0.5
+            + 0.4 * np.sin(2.0 * math.pi * (s + 0.3 * f) + a) * np.cos(2.0 * math.pi * t + b + level)
+            + 0.1 * np.sin(3.0 * f + c)
+            for a, b, c in phase
+        ]
+        texels = np.stack(for_all, axis=-1).reshape(-1, channels)
+        texels = texels + random.uniform(-0.15, 0.15, texels.shape)
+        levels.append(texels)
+    pyramid: FloatArray = np.clip(np.concatenate(levels), 0.0, 1.2).astype(np.float32)
+    if channels == 4:
+        pyramid[:, 3] = np.minimum(pyramid[:, 3], 1.0)
+        pyramid[:, :3] *= pyramid[:, 3:]
+    else:
+        pyramid *= 3.0
+    return pyramid
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A torus on a sphere's cap: two parts, the first of which has two shells, with a hull split."""
+
+    tracer: _core.Tracer
+    mesh: ReflectorMesh
+    irradiance: FloatArray
+    albedo: float
+
+
+def _scene(case: Case) -> Scene:
+    torus, ball = (
+        _core.make_torus((0.0, 0.1, 0.0), 0.12, 0.04, 40),
+        _core.make_sphere((0.0, 0.13, 0.0), 0.06, 32),
+    )
+    first = np.asarray(torus.positions)
+    positions = np.concatenate([first, np.asarray(ball.positions)])
+    normals = np.concatenate([np.asarray(torus.normals), np.asarray(ball.normals)])
+    triangles = np.concatenate(
+        [np.asarray(torus.triangles), np.asarray(ball.triangles) + np.uint32(len(first))]
+    )
+    parts = np.concatenate(
+        [np.zeros(len(torus.triangles), np.uint16), np.ones(len(ball.triangles), np.uint16)]
+    )
+    scene = _core.Scene()
+    material = _core.Material(
+        name="shiny",
+        specular=True,
+        fresnel=case.fresnel,
+        albedo=(0.4, 0.4, 0.4),
+        layers=_core.LayerModel.coated if case.coated else _core.LayerModel.additive,
+    )
+    mesh = _core.TriangleMesh(positions, triangles, normals, None, parts)
+    scene.add_object("object", mesh, scene.add_material(material), ["ring", "ball"])
+    scene.set_environment(np.ones((2, 4, 3), np.float32), 1.0, 0.0)
+    irradiance = (0.5 + 0.5 * normals[:, 1:2] * np.array([1.0, 0.8, 0.6])).astype(np.float32)
+    whole = np.ones(len(triangles), np.bool_)
+    whole[: len(triangles) // 5] = False
+    exported = ReflectorMesh(
+        positions, normals, triangles, parts, whole, (irradiance * (0.4 / math.pi)).astype(np.float32)
+    )
+    return Scene(_core.Tracer(scene, _core.TracerOptions()), exported, irradiance, 0.4)
+
+
+def _eye(t: float) -> tuple[float, float, float]:
+    azimuth, elevation = math.radians(t * ARC_DEGREES), math.radians(ELEVATION)
+    flat = DISTANCE * math.cos(elevation)
+    return flat * math.sin(azimuth), 0.1 + DISTANCE * math.sin(elevation), flat * math.cos(azimuth)
+
+
+class CasePem:
+    """The maps of a case as the page gets them: rounded to codes."""
+
+    def __init__(self) -> None:
+        self.code = RadianceCode.for_range(2.0, 3.6)
+        self._maps: dict[tuple[int, int, int], FloatArray] = {}
+        for sample in range(len(PARAMETERS)):
+            for part, shell, channels in ((0, 0, 4), (0, 1, 3), (1, 0, 3)):
+                self._maps[sample, part, shell] = _maps(97 * sample + 13 * part + shell, channels)
+
+    def pyramid(self, sample: int, part: int, shell: int) -> FloatArray:
+        return self._maps[sample, part, shell]
+
+    def rounded(self, code: RadianceCode, sample: int, part: int, shell: int) -> FloatArray:
+        pyramid = self._maps[sample, part, shell].copy()
+        pyramid[:, :3] = code.decode(code.encode(pyramid[:, :3]))
+        if pyramid.shape[1] == 4:
+            pyramid[:, 3] = np.rint(pyramid[:, 3] * 255.0) / 255.0
+        return pyramid
+
+
+def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
+    """The case as an exporter sees it."""
+    local, distant = proxy_to_attributes(case.local), proxy_to_attributes(case.distant)
+    parts = (
+        Part(
+            "ring",
+            (Shell("local", local, MAP_SIZE, opaque=False), Shell("distant", distant, MAP_SIZE, opaque=True)),
+        ),
+        Part("ball", (Shell("distant", distant, MAP_SIZE, opaque=True),)),
+    )
+    return ExportSource(
+        parts=parts,
+        parameters=PARAMETERS,
+        pyramid=pem.pyramid,
+        still=lambda sample: np.full((HEIGHT, WIDTH, 3), 0.2 + 0.2 * sample, np.float32),
+        mesh=scene.mesh,
+        material={
+            "fresnel": case.fresnel.model.name,
+            "r0": list(case.fresnel.r0),
+            "eta": list(case.fresnel.eta),
+            "k": list(case.fresnel.k),
+            "coated": case.coated,
+        },
+        static=_maps(1234, 3),
+        static_proxy=distant,
+        static_size=MAP_SIZE,
+        camera={
+            "kind": "arc",
+            "target": [0.0, 0.1, 0.0],
+            "radius": DISTANCE * math.cos(math.radians(ELEVATION)),
+            "height": DISTANCE * math.sin(math.radians(ELEVATION)),
+            "startDegrees": 0.0,
+            "degrees": ARC_DEGREES,
+            "verticalFovDegrees": FOV,
+            "aspect": WIDTH / HEIGHT,
+            "pixels": HEIGHT,
+        },
+        run_time={
+            "name": "Trilinear",
+            "places": [list(place) for place in PLACES],
+            "footprintScale": FOOTPRINT,
+            "filter": "trilinear",
+            "maxTaps": 1,
+        },
+        title=case.name,
+        notes=(),
+    )
+
+
+def reference(case: Case, scene: Scene, pem: CasePem, code: RadianceCode, t: float) -> FloatArray:
+    """The C++ renderer's picture at a parameter, (H, W, 4)."""
+    camera = _core.Camera(_eye(t), (0.0, 0.1, 0.0), vertical_fov_degrees=FOV, width=WIDTH, height=HEIGHT)
+    samples = scene.tracer.trace_visibility(camera, 0, places=PLACES)
+    place = t * (len(PARAMETERS) - 1)
+    first = min(int(place), len(PARAMETERS) - 2)
+    weight = np.float32(place - first)
+
+    def blended(part: int, shell: int) -> FloatArray:
+        a = pem.rounded(code, first, part, shell)
+        b = pem.rounded(code, first + 1, part, shell)
+        return (1 - weight) * a + weight * b
+
+    parts = [
+        _core.PartMaps(
+            case.distant, blended(0, 1), case.local, blended(0, 0), scene.mesh.whole_stack.astype(np.uint8)
+        ),
+        _core.PartMaps(case.distant, blended(1, 0)),
+    ]
+    diffuse = _core.diffuse_from_irradiance(samples, scene.mesh.triangles, scene.irradiance)
+    options = _core.LookupOptions(footprint_scale=FOOTPRINT)
+    return _core.render_reflector(samples, parts, _core.CubePyramidLayout(MAP_SIZE), diffuse, options)
+
+
+def write_case(case: Case, folder: Path, image_format: ImageFormat) -> None:
+    """Write the export and the reference pictures of a case."""
+    scene, pem = _scene(case), CasePem()
+    source = case_source(case, scene, pem)
+    web = WebPem(source, WebOptions(image_format))
+    write_folder(web, case.name, folder, lambda done, total, text: None)
+    manifest = json.loads(web.read("manifest.json"))
+    code = RadianceCode(**manifest["radiance"])
+    pictures: list[dict[str, Any]] = []
+    for k, t in enumerate((0.0, 0.3)):
+        reference(case, scene, pem, code, t).astype("<f4").tofile(folder / f"reference-{k}.f32")
+        pictures.append({"file": f"reference-{k}.f32", "parameter": t, "elevation": ELEVATION})
+    (folder / "reference.json").write_text(
+        json.dumps({"width": WIDTH, "height": HEIGHT, "distance": DISTANCE, "pictures": pictures})
+    )
+
+
+def main(out: Path) -> None:
+    for case in cases():
+        write_case(case, out / case.name, ImageFormat(exact=True))
+    write_case(cases()[1], out / "avif", ImageFormat(exact=False))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,56 @@
+/// Decodes images away from the page's own thread, and expands their codes before anything is filtered.
+
+import { assembleAlpha, assembleRadiance, packSharedExponent, radianceTable } from "./atlas";
+import type { Decoded, DecodeRequest } from "./decoder";
+
+async function pixelsOf(bytes: ArrayBuffer, type: string): Promise<ImageData> {
+  const bitmap = await createImageBitmap(new Blob([bytes], { type }), {
+    colorSpaceConversion: "none",
+    premultiplyAlpha: "none",
+  });
+  const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+  const context = canvas.getContext("2d", { willReadFrequently: true });
+  if (!context) throw new Error("no 2D canvas");
+  context.drawImage(bitmap, 0, 0);
+  bitmap.close();
+  return context.getImageData(0, 0, canvas.width, canvas.height);
+}
+
+async function decode(request: DecodeRequest): Promise<Decoded> {
+  const image = await pixelsOf(request.bytes, request.type);
+  const { width, height, data } = image;
+  if (request.kind === "probe") {
+    const colours = [];
+    for (let x = 4; x < width; x += 8) {
+      const at = 4 * (4 * width + x);
+      colours.push([data[at], data[at + 1], data[at + 2]]);
+    }
+    return { width, height, colours };
+  }
+  if (request.kind === "still") {
+    const table = radianceTable(request.code);
+    const packed = new Uint32Array(width * height);
+    for (let i = 0; i < packed.length; ++i) {
+      packed[i] = packSharedExponent(table[data[4 * i]], table[data[4 * i + 1]], table[data[4 * i + 2]]);
+    }
+    return { width, height, packed };
+  }
+  const { size } = request;
+  const rows = size > 1 ? 3 * size : 2;
+  if (width !== 3 * size || height !== rows) {
+    throw new Error(`is ${width}×${height} pixels, not ${3 * size}×${rows}`);
+  }
+  if (request.kind === "alpha") return { width, height, alpha: assembleAlpha(data, size) };
+  return { width, height, packed: assembleRadiance(data, size, radianceTable(request.code)) };
+}
+
+self.onmessage = async (event: MessageEvent<DecodeRequest & { id: number }>) => {
+  const { id } = event.data;
+  try {
+    const result = await decode(event.data);
+    const owned = [result.packed?.buffer, result.alpha?.buffer].filter((b) => b !== undefined);
+    self.postMessage({ id, result }, { transfer: owned as Transferable[] });
+  } catch (failure) {
+    self.postMessage({ id, failure: failure instanceof Error ? failure.message : String(failure) });
+  }
+};

@@ -1,0 +1,134 @@
+import { layerSize } from "../atlas";
+import { UserError } from "../errors";
+import type { Manifest } from "../manifest";
+import type { Counters } from "./program";
+
+/// Bytes of the maps of one sample on the GPU.
+export function sampleBytes(manifest: Manifest): number {
+  const { width, height } = layerSize(largestSize(manifest));
+  const { maps, alphas } = mapCounts(manifest);
+  return 6 * width * height * (4 * maps + alphas);
+}
+
+export function largestSize(manifest: Manifest): number {
+  return Math.max(manifest.static.size, ...manifest.parts.flatMap((p) => p.shells.map((s) => s.size)));
+}
+
+/// Maps of a sample, and those of them that have an α.
+export function mapCounts(manifest: Manifest): { maps: number; alphas: number } {
+  const shells = manifest.parts.flatMap((p) => p.shells);
+  return { maps: shells.length, alphas: shells.filter((s) => !s.opaque).length };
+}
+
+/// The maps on the GPU: two array textures of one size for the life of the page, in which samples take turns.
+export class MapPool {
+  /// How many samples there is room for.
+  readonly capacity: number;
+  readonly bytes: number;
+  readonly width: number;
+  readonly height: number;
+  private readonly radiance: WebGLTexture | null;
+  private readonly alpha: WebGLTexture | null;
+  private readonly maps: number;
+  private readonly alphas: number;
+
+  /// At most `budget` bytes, but room for `least` samples.
+  constructor(
+    private readonly gl: WebGL2RenderingContext,
+    manifest: Manifest,
+    budget: number,
+    least: number,
+    private readonly counters: Counters,
+  ) {
+    const { width, height } = layerSize(largestSize(manifest));
+    const { maps, alphas } = mapCounts(manifest);
+    this.width = width;
+    this.height = height;
+    this.maps = maps;
+    this.alphas = alphas;
+    const layers = gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number;
+    const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
+    const room = Math.floor((layers / 6 - 1) / maps);
+    if (room < least || Math.max(width, height) > side) {
+      throw new UserError(
+        "texture",
+        `This graphics card has no room for the maps: they need ${6 * (least * maps + 1)} layers of ` +
+          `${width}×${height} texels, it has ${layers} of ${side}×${side}.`,
+      );
+    }
+    const affordable = Math.floor(budget / sampleBytes(manifest));
+    this.capacity = Math.min(Math.max(affordable, least), room, manifest.samples.length);
+    const radianceLayers = 6 * (this.capacity * maps + 1);
+    const alphaLayers = Math.max(6 * this.capacity * alphas, 1);
+    this.bytes = width * height * (4 * radianceLayers + alphaLayers);
+    this.radiance = this.texture(gl.RGB9_E5, radianceLayers);
+    this.alpha = this.texture(gl.R8, alphaLayers);
+  }
+
+  /// First layer of a map of the sample in a slot; `map` counts through parts and shells.
+  radianceLayer(slot: number, map: number): number {
+    return 6 * (slot * this.maps + map);
+  }
+
+  /// The same of α; `map` counts the shells that have one.
+  alphaLayer(slot: number, map: number): number {
+    return 6 * (slot * this.alphas + map);
+  }
+
+  /// First layer of the static map.
+  staticLayer(): number {
+    return 6 * this.capacity * this.maps;
+  }
+
+  uploadRadiance(layer: number, width: number, height: number, texels: Uint32Array): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.radiance);
+    gl.texSubImage3D(
+      gl.TEXTURE_2D_ARRAY,
+      0,
+      0,
+      0,
+      layer,
+      width,
+      height,
+      6,
+      gl.RGB,
+      gl.UNSIGNED_INT_5_9_9_9_REV,
+      texels,
+    );
+    ++this.counters.uploaded;
+  }
+
+  uploadAlpha(layer: number, width: number, height: number, texels: Uint8Array): void {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.alpha);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 6, gl.RED, gl.UNSIGNED_BYTE, texels);
+    ++this.counters.uploaded;
+  }
+
+  /// Binds radiance to unit 0 and α to unit 1.
+  bind(): void {
+    const { gl } = this;
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.alpha);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.radiance);
+  }
+
+  private texture(format: number, layers: number): WebGLTexture | null {
+    const { gl } = this;
+    const handle = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, handle);
+    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, format, this.width, this.height, layers);
+    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+    ++this.counters.allocated;
+    if (gl.getError() === gl.OUT_OF_MEMORY) {
+      throw new UserError("texture", "There is not enough graphics memory for the maps.");
+    }
+    return handle;
+  }
+}

@@ -1,0 +1,437 @@
+/// Draws one frame. All that depends on the frame comes in by a FrameState; what lives longer is here.
+
+import { layerSize } from "../atlas";
+import { UserError } from "../errors";
+import type { Manifest, ProxyShape } from "../manifest";
+import type { View } from "../math";
+import type { Mesh } from "../mesh";
+import { MapPool } from "./map_pool";
+import { type Counters, Program } from "./program";
+import * as shaders from "./shaders";
+import { Targets } from "./targets";
+
+/// How many samples of the parameter are blended: those on both sides.
+export const NODES = 2;
+
+export type Content = "pem" | "static" | "still";
+
+export interface FrameState {
+  width: number;
+  height: number;
+  view: View;
+  /// Where in a pixel the lookups lie; one of them is antialiased at edges by the hardware.
+  places: [number, number][];
+  footprint: number;
+  maxTaps: number;
+  /// What is drawn left of the divider and right of it; `divider` in pixels from the left.
+  left: Content;
+  right: Content;
+  divider: number;
+  /// Slots of the blended samples in the pool, and their weights.
+  slots: number[];
+  weights: number[];
+  /// Share of the PEM, the rest is the static map; 0 while no sample is there.
+  pem: number;
+  shellsOn: boolean[];
+  fresnelOn: boolean;
+  diffuseOn: boolean;
+  background: "surroundings" | "plain";
+  plain: [number, number, number];
+  exposure: number;
+  neutral: boolean;
+  stillScale: [number, number];
+}
+
+const FRESNEL: { [name: string]: number } = { constant: 0, schlick: 1, dielectric: 2, conductor: 3 };
+const SHAPES: { [name: string]: number } = { infinite: 0, box: 1, ellipsoid: 2, hemisphere: 3 };
+
+interface PartUniforms {
+  shape: Int32Array;
+  centre: Float32Array;
+  proxyFromWorld: Float32Array;
+  halfExtent: Float32Array;
+  origin: Float32Array;
+  size: Float32Array;
+  shellOn: Float32Array;
+  radianceLayer: Float32Array;
+  alphaLayer: Float32Array;
+  /// Numbers of the part's first map and first α within a sample.
+  firstMap: number;
+  firstAlpha: number;
+}
+
+export class Renderer {
+  readonly counters: Counters = { compiled: 0, allocated: 0, uploaded: 0 };
+  readonly pool: MapPool;
+  private readonly targets: Targets;
+  private readonly meshPrograms = new Map<number, Program>();
+  private readonly background: Program;
+  private readonly still: Program;
+  private readonly copy: Program;
+  private readonly display: Program;
+  private readonly vertices: WebGLVertexArrayObject | null;
+  private readonly empty: WebGLVertexArrayObject | null;
+  private readonly parts: PartUniforms[];
+  private readonly staticUniforms: PartUniforms;
+  private readonly weights = new Float32Array(NODES);
+  private readonly flat: boolean;
+  private stillTexture: WebGLTexture | null = null;
+
+  constructor(
+    readonly gl: WebGL2RenderingContext,
+    private readonly manifest: Manifest,
+    mesh: Mesh,
+    budget: number,
+  ) {
+    if (!gl.getExtension("EXT_color_buffer_float") && !gl.getExtension("EXT_color_buffer_half_float")) {
+      throw new UserError(
+        "texture",
+        "This graphics card cannot draw into half-float images, which the page needs.",
+      );
+    }
+    this.pool = new MapPool(gl, manifest, budget, NODES, this.counters);
+    this.targets = new Targets(gl, this.counters);
+    for (const part of manifest.parts) this.meshProgram(part.shells.length);
+    this.background = new Program(gl, shaders.FULL_VERTEX, shaders.BACKGROUND_FRAGMENT, this.counters);
+    this.still = new Program(gl, shaders.FULL_VERTEX, shaders.STILL_FRAGMENT, this.counters);
+    this.copy = new Program(gl, shaders.FULL_VERTEX, shaders.COPY_FRAGMENT, this.counters);
+    this.display = new Program(gl, shaders.FULL_VERTEX, shaders.DISPLAY_FRAGMENT, this.counters);
+    this.empty = gl.createVertexArray();
+    this.vertices = this.uploadMesh(mesh);
+    this.flat = mesh.normals === null;
+    this.staticUniforms = partUniforms([], manifest.static.proxy, [manifest.static.size], 0, 0);
+    let firstMap = 0;
+    let firstAlpha = 0;
+    this.parts = manifest.parts.map((part) => {
+      const uniforms = partUniforms(
+        part.shells.map((s) => s.proxy),
+        manifest.static.proxy,
+        [...part.shells.map((s) => s.size), manifest.static.size],
+        firstMap,
+        firstAlpha,
+      );
+      firstMap += part.shells.length;
+      firstAlpha += part.shells.filter((s) => !s.opaque).length;
+      return uniforms;
+    });
+  }
+
+  private meshProgram(shells: number): Program {
+    let program = this.meshPrograms.get(shells);
+    if (!program) {
+      program = new Program(this.gl, shaders.MESH_VERTEX, shaders.meshFragment(shells, NODES), this.counters);
+      this.meshPrograms.set(shells, program);
+    }
+    return program;
+  }
+
+  private uploadMesh(mesh: Mesh): WebGLVertexArrayObject | null {
+    const { gl } = this;
+    const array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    const attribute = (
+      place: number,
+      data: BufferSource,
+      count: number,
+      type: number,
+      normalised: boolean,
+    ) => {
+      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+      gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, count, type, normalised, 0, 0);
+      ++this.counters.allocated;
+    };
+    attribute(0, mesh.positions as BufferSource, 3, gl.UNSIGNED_SHORT, true);
+    if (mesh.normals) attribute(1, mesh.normals as BufferSource, 2, gl.SHORT, true);
+    if (mesh.diffuse) attribute(2, mesh.diffuse as BufferSource, 3, gl.HALF_FLOAT, false);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices as BufferSource, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    return array;
+  }
+
+  uploadStatic(texels: Uint32Array): void {
+    const { width, height } = layerSize(this.manifest.static.size);
+    this.pool.uploadRadiance(this.pool.staticLayer(), width, height, texels);
+  }
+
+  /// One map of the sample in a slot. `alpha` for shells that have one.
+  uploadMap(
+    slot: number,
+    part: number,
+    shell: number,
+    texels: Uint32Array,
+    alpha: Uint8Array | undefined,
+  ): void {
+    const { shells } = this.manifest.parts[part];
+    const { width, height } = layerSize(shells[shell].size);
+    const uniforms = this.parts[part];
+    this.pool.uploadRadiance(this.pool.radianceLayer(slot, uniforms.firstMap + shell), width, height, texels);
+    if (alpha) {
+      const before = shells.slice(0, shell).filter((s) => !s.opaque).length;
+      this.pool.uploadAlpha(this.pool.alphaLayer(slot, uniforms.firstAlpha + before), width, height, alpha);
+    }
+  }
+
+  uploadStill(width: number, height: number, texels: Uint32Array): void {
+    const { gl } = this;
+    if (this.stillTexture) gl.deleteTexture(this.stillTexture);
+    this.stillTexture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, this.stillTexture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGB9_E5, width, height);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, texels);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+    ++this.counters.uploaded;
+  }
+
+  /// Draws into the canvas, whose lower left corner is at (x, 0).
+  draw(frame: FrameState, x = 0): void {
+    const { gl } = this;
+    this.drawLinear(frame);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.disable(gl.DEPTH_TEST);
+    gl.disable(gl.BLEND);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.viewport(x, 0, frame.width, frame.height);
+    gl.scissor(x, 0, frame.width, frame.height);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.targets.sumTexture);
+    this.display.use();
+    gl.uniform1i(this.display.at("uImage"), 0);
+    gl.uniform1f(this.display.at("uExposure"), frame.exposure);
+    gl.uniform1i(this.display.at("uNeutral"), frame.neutral ? 1 : 0);
+    gl.bindVertexArray(this.empty);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /// Scene-linear light and, in alpha, the object's coverage; RGBA from the lower left corner.
+  readLinear(frame: FrameState): Float32Array {
+    this.drawLinear(frame);
+    const pixels = new Float32Array(4 * frame.width * frame.height);
+    this.targets.bindSum();
+    this.gl.readPixels(0, 0, frame.width, frame.height, this.gl.RGBA, this.gl.FLOAT, pixels);
+    return pixels;
+  }
+
+  private drawLinear(frame: FrameState): void {
+    const { gl, targets } = this;
+    const { width, height, places } = frame;
+    targets.resize(width, height, places.length > 1 ? 1 : 4);
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.CULL_FACE);
+    if (places.length > 1) {
+      targets.bindSum();
+      gl.disable(gl.SCISSOR_TEST);
+      gl.clearColor(0, 0, 0, 0);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+    }
+    for (const place of places) {
+      targets.bindPass();
+      gl.disable(gl.SCISSOR_TEST);
+      gl.clearColor(0, 0, 0, 0);
+      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+      gl.enable(gl.SCISSOR_TEST);
+      const divider = Math.min(Math.max(Math.round(frame.divider), 0), width);
+      if (divider > 0) {
+        gl.scissor(0, 0, divider, height);
+        this.drawContent(frame, frame.left, place);
+      }
+      if (divider < width) {
+        gl.scissor(divider, 0, width - divider, height);
+        this.drawContent(frame, frame.right, place);
+      }
+      if (places.length > 1) this.accumulate(1 / places.length);
+    }
+    if (places.length === 1) {
+      gl.disable(gl.SCISSOR_TEST);
+      targets.resolve();
+    }
+  }
+
+  private accumulate(share: number): void {
+    const { gl } = this;
+    this.targets.bindSum();
+    gl.disable(gl.SCISSOR_TEST);
+    gl.disable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.targets.passTexture);
+    this.copy.use();
+    gl.uniform1i(this.copy.at("uImage"), 0);
+    gl.uniform1f(this.copy.at("uShare"), share);
+    gl.bindVertexArray(this.empty);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.BLEND);
+  }
+
+  private drawContent(frame: FrameState, content: Content, place: [number, number]): void {
+    const { gl } = this;
+    gl.disable(gl.DEPTH_TEST);
+    gl.bindVertexArray(this.empty);
+    if (content === "still" && this.stillTexture) {
+      gl.activeTexture(gl.TEXTURE0);
+      gl.bindTexture(gl.TEXTURE_2D, this.stillTexture);
+      this.still.use();
+      gl.uniform1i(this.still.at("uStill"), 0);
+      gl.uniform2f(this.still.at("uScale"), frame.stillScale[0], frame.stillScale[1]);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+      return;
+    }
+    this.pool.bind();
+    this.drawBackground(frame, place);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LESS);
+    gl.bindVertexArray(this.vertices);
+    for (let p = 0; p < this.parts.length; ++p) this.drawPart(frame, content, place, p);
+  }
+
+  private drawBackground(frame: FrameState, place: [number, number]): void {
+    const { gl, background, pool } = this;
+    const { view } = frame;
+    background.use();
+    gl.uniform1i(background.at("uRadiance"), 0);
+    gl.uniform1i(background.at("uAlpha"), 1);
+    gl.uniform2f(background.at("uLayer"), 1 / pool.width, 1 / pool.height);
+    gl.uniform1i(background.at("uMaxTaps"), 1);
+    gl.uniform3fv(background.at("uForward"), view.forward);
+    gl.uniform3fv(background.at("uRight"), view.right);
+    gl.uniform3fv(background.at("uDown"), view.down);
+    gl.uniform2f(background.at("uPixels"), frame.width, frame.height);
+    gl.uniform2f(background.at("uPlace"), place[0], place[1]);
+    gl.uniform1f(background.at("uSize"), this.manifest.static.size);
+    gl.uniform1f(background.at("uStaticLayer"), pool.staticLayer());
+    const proxy = this.staticUniforms;
+    gl.uniform3fv(background.at("uEye"), view.eye);
+    gl.uniform1i(background.at("uShape"), proxy.shape[0]);
+    gl.uniform3fv(background.at("uCentre"), proxy.centre);
+    gl.uniformMatrix3fv(background.at("uProxyFromWorld"), false, proxy.proxyFromWorld);
+    gl.uniform3fv(background.at("uHalfExtent"), proxy.halfExtent);
+    gl.uniform3fv(background.at("uOrigin"), proxy.origin);
+    const [r, g, b] = frame.plain;
+    gl.uniform4f(background.at("uPlain"), r, g, b, frame.background === "plain" ? 1 : 0);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  private drawPart(frame: FrameState, content: Content, place: [number, number], p: number): void {
+    const { gl, manifest, pool } = this;
+    const { view } = frame;
+    const part = this.parts[p];
+    const shells = manifest.parts[p].shells;
+    const range = manifest.mesh.parts[p];
+    if (range.count === 0) return;
+    const program = this.meshProgram(shells.length);
+    program.use();
+    gl.uniform1i(program.at("uRadiance"), 0);
+    gl.uniform1i(program.at("uAlpha"), 1);
+    gl.uniform2f(program.at("uLayer"), 1 / pool.width, 1 / pool.height);
+    gl.uniform1i(program.at("uMaxTaps"), frame.maxTaps);
+    gl.uniformMatrix4fv(program.at("uClipFromWorld"), false, view.clipFromWorld);
+    gl.uniform2f(
+      program.at("uShift"),
+      ((0.5 - place[0]) * 2) / frame.width,
+      ((place[1] - 0.5) * 2) / frame.height,
+    );
+    const { low, high } = manifest.mesh.bounds;
+    gl.uniform3fv(program.at("uLow"), low);
+    gl.uniform3f(program.at("uExtent"), high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    gl.uniform3fv(program.at("uEye"), view.eye);
+    gl.uniform3fv(program.at("uForward"), view.forward);
+    gl.uniform3fv(program.at("uRight"), view.right);
+    gl.uniform3fv(program.at("uDown"), view.down);
+    gl.uniform1f(program.at("uFootprint"), frame.footprint);
+    gl.uniform1i(program.at("uFlat"), this.flat ? 1 : 0);
+    gl.uniform1iv(program.at("uShape"), part.shape);
+    gl.uniform3fv(program.at("uCentre"), part.centre);
+    gl.uniformMatrix3fv(program.at("uProxyFromWorld"), false, part.proxyFromWorld);
+    gl.uniform3fv(program.at("uHalfExtent"), part.halfExtent);
+    gl.uniform3fv(program.at("uOrigin"), part.origin);
+    gl.uniform1fv(program.at("uSize"), part.size);
+    let alpha = 0;
+    for (let s = 0; s < shells.length; ++s) {
+      part.shellOn[s] = frame.shellsOn[s] === false ? 0 : 1;
+      for (let n = 0; n < NODES; ++n) {
+        const at = n * shells.length + s;
+        part.radianceLayer[at] = pool.radianceLayer(frame.slots[n], part.firstMap + s);
+        part.alphaLayer[at] = shells[s].opaque
+          ? -1
+          : pool.alphaLayer(frame.slots[n], part.firstAlpha + alpha);
+      }
+      if (!shells[s].opaque) ++alpha;
+    }
+    for (let n = 0; n < NODES; ++n) this.weights[n] = frame.weights[n];
+    gl.uniform1fv(program.at("uShellOn"), part.shellOn);
+    gl.uniform1fv(program.at("uRadianceLayer"), part.radianceLayer);
+    gl.uniform1fv(program.at("uAlphaLayer"), part.alphaLayer);
+    gl.uniform1fv(program.at("uWeight"), this.weights);
+    gl.uniform1f(program.at("uStaticLayer"), pool.staticLayer());
+    gl.uniform1f(program.at("uPem"), content === "pem" ? frame.pem : 0);
+    const { material } = manifest;
+    gl.uniform1i(program.at("uFresnel"), frame.fresnelOn ? (FRESNEL[material.fresnel] ?? 0) : 4);
+    gl.uniform3fv(program.at("uR0"), material.r0);
+    gl.uniform3fv(program.at("uEta"), material.eta);
+    gl.uniform3fv(program.at("uK"), material.k);
+    gl.uniform1i(program.at("uCoated"), material.coated ? 1 : 0);
+    gl.uniform1f(program.at("uDiffuseOn"), frame.diffuseOn ? 1 : 0);
+    // Triangles that carry all shells, then those on the hull.
+    const stacked = program.at("uStacked");
+    gl.uniform1i(stacked, 1);
+    if (range.stacked > 0) {
+      gl.drawElements(gl.TRIANGLES, 3 * range.stacked, gl.UNSIGNED_INT, 12 * range.start);
+    }
+    gl.uniform1i(stacked, 0);
+    if (range.count > range.stacked) {
+      gl.drawElements(
+        gl.TRIANGLES,
+        3 * (range.count - range.stacked),
+        gl.UNSIGNED_INT,
+        12 * (range.start + range.stacked),
+      );
+    }
+  }
+}
+
+function partUniforms(
+  proxies: ProxyShape[],
+  staticProxy: ProxyShape,
+  sizes: number[],
+  firstMap: number,
+  firstAlpha: number,
+): PartUniforms {
+  const all = [...proxies, staticProxy];
+  const uniforms: PartUniforms = {
+    shape: new Int32Array(all.length),
+    centre: new Float32Array(3 * all.length),
+    proxyFromWorld: new Float32Array(9 * all.length),
+    halfExtent: new Float32Array(3 * all.length).fill(1),
+    origin: new Float32Array(3 * all.length),
+    size: Float32Array.from(sizes),
+    shellOn: new Float32Array(proxies.length).fill(1),
+    radianceLayer: new Float32Array(proxies.length * NODES),
+    alphaLayer: new Float32Array(proxies.length * NODES),
+    firstMap,
+    firstAlpha,
+  };
+  all.forEach((proxy, i) => {
+    uniforms.shape[i] = SHAPES[proxy.shape];
+    uniforms.origin.set(proxy.origin, 3 * i);
+    uniforms.centre.set(proxy.centre ?? [0, 0, 0], 3 * i);
+    uniforms.halfExtent.set(proxy.half_extent ?? [1, 1, 1], 3 * i);
+    const radii = proxy.radii ?? (proxy.radius ? [proxy.radius, proxy.radius, proxy.radius] : [1, 1, 1]);
+    const axes = proxy.axes ?? [
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+    ];
+    for (let row = 0; row < 3; ++row) {
+      for (let column = 0; column < 3; ++column) {
+        uniforms.proxyFromWorld[9 * i + 3 * column + row] = axes[row][column] / radii[row];
+      }
+    }
+  });
+  return uniforms;
+}

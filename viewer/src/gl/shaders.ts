@@ -1,0 +1,459 @@
+/// The drawing itself. Every level and every tap of a lookup is placed here, by the formula of the run-time model
+/// (mirrorbake/envmap/reads.hpp, mirrorbake/surface/lookup.hpp): drivers' own levels and anisotropy differ between cards.
+
+const HEADER = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
+`;
+
+export const MESH_VERTEX = `${HEADER}
+layout(location = 0) in vec3 aPosition;
+layout(location = 1) in vec2 aNormal;
+layout(location = 2) in vec3 aDiffuse;
+uniform mat4 uClipFromWorld;
+uniform vec2 uShift;  // of the image, in clip space
+uniform vec3 uLow;
+uniform vec3 uExtent;
+out vec3 vPosition;
+out vec3 vNormal;
+out vec3 vDiffuse;
+
+vec3 fromOctahedron(vec2 e) {
+  vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
+  if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
+  return normalize(n);
+}
+
+void main() {
+  vPosition = uLow + aPosition * uExtent;
+  vNormal = fromOctahedron(aNormal);
+  vDiffuse = aDiffuse;
+  gl_Position = uClipFromWorld * vec4(vPosition, 1.0);
+  gl_Position.xy += uShift * gl_Position.w;
+}
+`;
+
+/// Reads of a map: needs the samplers uRadiance and uAlpha, and uLayer: 1 / size of a layer in texels.
+const READS = `
+uniform sampler2DArray uRadiance;
+uniform sampler2DArray uAlpha;
+uniform vec2 uLayer;
+uniform int uMaxTaps;
+
+struct FacePoint {
+  float face;
+  vec2 st;
+};
+
+FacePoint facePoint(vec3 d) {
+  vec3 a = abs(d);
+  if (a.x >= a.y && a.x >= a.z) {
+    vec2 st = vec2(d.x > 0.0 ? -d.z : d.z, -d.y) / max(a.x, 1e-30);
+    return FacePoint(d.x < 0.0 ? 1.0 : 0.0, 0.5 + 0.5 * st);
+  }
+  if (a.y >= a.z) {
+    vec2 st = vec2(d.x, d.y > 0.0 ? d.z : -d.z) / a.y;
+    return FacePoint(d.y < 0.0 ? 3.0 : 2.0, 0.5 + 0.5 * st);
+  }
+  vec2 st = vec2(d.z > 0.0 ? d.x : -d.x, -d.y) / a.z;
+  return FacePoint(d.z < 0.0 ? 5.0 : 4.0, 0.5 + 0.5 * st);
+}
+
+// Where a level lies in a layer (layerPlace in atlas.ts), and a point of the face on it.
+vec2 levelPoint(float size, float level, vec2 st) {
+  float n = max(floor(size * exp2(-level) + 0.5), 1.0);
+  vec2 corner = level < 0.5 ? vec2(0.0) : vec2(size + 2.0, size - 2.0 * n + 2.0 * (level - 1.0));
+  return (corner + 1.0 + clamp(st, 0.0, 1.0) * n) * uLayer;
+}
+
+float faceLength(vec3 d, vec3 change) {
+  vec3 a = abs(d);
+  float major;
+  vec3 onFace;
+  if (a.x >= a.y && a.x >= a.z) {
+    onFace = change - d * (change.x / d.x);
+    major = a.x;
+    onFace.x = 0.0;
+  } else if (a.y >= a.z) {
+    onFace = change - d * (change.y / d.y);
+    major = a.y;
+    onFace.y = 0.0;
+  } else {
+    onFace = change - d * (change.z / d.z);
+    major = a.z;
+    onFace.z = 0.0;
+  }
+  return 0.5 * length(onFace) / max(major, 1e-30);
+}
+
+struct Taps {
+  float level;
+  int pairs;  // 0: one tap in the middle
+  float step;
+  float n;
+  vec3 longer;
+};
+
+// TapPattern of mirrorbake/envmap/reads.hpp.
+Taps tapsOf(vec3 d, vec3 ddx, vec3 ddy, float size) {
+  float x = size * faceLength(d, ddx);
+  float y = size * faceLength(d, ddy);
+  float major = max(x, y);
+  Taps taps = Taps(0.0, 0, 0.0, 1.0, y > x ? ddy : ddx);
+  if (!(major > 1.0)) return taps;
+  float n = clamp(major / max(min(x, y), 1.0), 1.0, float(uMaxTaps));
+  taps.level = clamp(log2(major / n), 0.0, log2(size));
+  taps.n = n;
+  if (n <= 1.25) return taps;
+  taps.pairs = int(ceil(0.5 * n));
+  taps.step = taps.pairs == 1 ? 0.5 * (n - 1.25) / 0.75 : 1.0 / n;
+  return taps;
+}
+
+vec3 readRadiance(vec3 d, float level, float size, float layer) {
+  FacePoint p = facePoint(d);
+  float finer = floor(level);
+  float fraction = level - finer;
+  vec3 value = textureLod(uRadiance, vec3(levelPoint(size, finer, p.st), layer + p.face), 0.0).rgb;
+  if (fraction > 0.0) {
+    vec3 coarser = textureLod(uRadiance, vec3(levelPoint(size, finer + 1.0, p.st), layer + p.face), 0.0).rgb;
+    value = mix(value, coarser, fraction);
+  }
+  return value;
+}
+
+float readAlpha(vec3 d, float level, float size, float layer) {
+  FacePoint p = facePoint(d);
+  float finer = floor(level);
+  float fraction = level - finer;
+  float value = textureLod(uAlpha, vec3(levelPoint(size, finer, p.st), layer + p.face), 0.0).r;
+  if (fraction > 0.0) {
+    float coarser = textureLod(uAlpha, vec3(levelPoint(size, finer + 1.0, p.st), layer + p.face), 0.0).r;
+    value = mix(value, coarser, fraction);
+  }
+  return value;
+}
+`;
+
+const EXITS = `
+// Where a ray leaves a proxy: mirrorbake/proxy/lookup_formulas.hpp.
+float boxExit(vec3 p, vec3 d, vec3 extent) {
+  float t = 1e37;
+  for (int i = 0; i < 3; ++i) {
+    float speed = abs(d[i]);
+    float side = d[i] < 0.0 ? -extent[i] : extent[i];
+    if (speed > 0.0) t = min(t, abs(side - p[i]) / speed);
+  }
+  return t < 1e36 ? t : 0.0;
+}
+
+float sphereExit(vec3 p, vec3 d) {
+  float a = dot(d, d);
+  float b = dot(p, d);
+  float c = dot(p, p) - 1.0;
+  float s = sqrt(max(b * b - a * c, 0.0));
+  float t = b > 0.0 ? -c / (b + s) : (s - b) / a;
+  return t > 0.0 ? t : 0.0;
+}
+
+// Of a shape: 0 infinite, 1 box, 2 ellipsoid, 3 hemisphere.
+vec3 leave(int shape, vec3 p, vec3 d, vec3 centre, mat3 proxyFromWorld, vec3 halfExtent, vec3 origin) {
+  if (shape == 0) return d;
+  vec3 q = proxyFromWorld * (p - centre);
+  vec3 e = proxyFromWorld * d;
+  float t;
+  if (shape == 1) {
+    t = boxExit(q, e, halfExtent);
+  } else {
+    t = sphereExit(q, e);
+    if (shape == 3 && e.y < 0.0) t = min(t, abs(q.y / e.y));
+  }
+  return p + t * d - origin;
+}
+`;
+
+/// `shells` of the part and `nodes` that are blended are constants of the program.
+export function meshFragment(shells: number, nodes: number): string {
+  return `${HEADER}
+#define SHELLS ${shells}
+#define NODES ${nodes}
+in vec3 vPosition;
+in vec3 vNormal;
+in vec3 vDiffuse;
+out vec4 oColour;
+${READS}
+uniform vec3 uEye;
+uniform vec3 uForward;  // the image plane at distance 1
+uniform vec3 uRight;    // one pixel to the right on it
+uniform vec3 uDown;     // one pixel down
+uniform float uFootprint;
+uniform bool uFlat;
+
+// Proxies of the shells, front to back, and last that of the static map.
+uniform int uShape[SHELLS + 1];
+uniform vec3 uCentre[SHELLS + 1];
+uniform mat3 uProxyFromWorld[SHELLS + 1];  // scaled, but for boxes
+uniform vec3 uHalfExtent[SHELLS + 1];
+uniform vec3 uOrigin[SHELLS + 1];
+uniform float uSize[SHELLS + 1];
+uniform float uShellOn[SHELLS];
+uniform float uRadianceLayer[SHELLS * NODES];
+uniform float uAlphaLayer[SHELLS * NODES];  // below 0: opaque
+uniform float uWeight[NODES];
+uniform float uStaticLayer;
+uniform float uPem;  // share of the PEM in the mixture with the static map
+uniform bool uStacked;  // false: the last shell alone
+
+uniform int uFresnel;  // 0: constant, 1: Schlick, 2: dielectric, 3: conductor, 4: none
+uniform vec3 uR0;
+uniform vec3 uEta;
+uniform vec3 uK;
+uniform bool uCoated;
+uniform float uDiffuseOn;
+
+${EXITS}
+vec3 lookupDirection(int shell, vec3 p, vec3 d) {
+  return leave(
+    uShape[shell], p, d, uCentre[shell], uProxyFromWorld[shell], uHalfExtent[shell], uOrigin[shell]
+  );
+}
+
+vec3 fresnel(float cosine) {
+  float c = clamp(cosine, 0.0, 1.0);
+  if (uFresnel == 0) return uR0;
+  if (uFresnel == 4) return vec3(1.0);
+  float q = (1.0 - c) * (1.0 + c);
+  if (uFresnel == 1) {
+    float m = 1.0 - c;
+    return min(uR0 + (1.0 - uR0) * (m * m * m * m * m), 1.0);
+  }
+  if (uFresnel == 2) {
+    vec3 g2 = (uEta - 1.0) * (uEta + 1.0) + c * c;
+    vec3 g = sqrt(max(g2, 0.0));
+    vec3 s = g + c;
+    vec3 r = (uEta - 1.0) * (uEta + 1.0) / max(s * s, 1e-20);
+    vec3 sum = c * g + q;
+    vec3 f = r * r * (c * c * g * g + q * q) / max(sum * sum, 1e-20);
+    return mix(min(f, 1.0), vec3(1.0), lessThan(g2, vec3(0.0)));
+  }
+  vec3 t = uEta * uEta - uK * uK - q;
+  vec3 nk = uEta * uK;
+  vec3 m = sqrt(t * t + 4.0 * nk * nk);
+  vec3 r2 = 0.5 * (m + abs(t));
+  vec3 r = sqrt(max(r2, 1e-20));
+  vec3 a = mix(r, nk / r, lessThan(t, vec3(0.0)));
+  vec3 rs = (m + c * c - 2.0 * a * c) / (m + c * c + 2.0 * a * c);
+  vec3 big = m * c * c + q * q;
+  return min(rs * big / max(big + 2.0 * a * c * q, 1e-20), 1.0);
+}
+
+// Tracer's bend_normal: a normal that reflects the view into the surface is bent until it does not.
+vec3 bend(vec3 view, vec3 n, vec3 g) {
+  float c = dot(n, view);
+  if (c < 0.0) n = normalize(n - c * view);
+  vec3 r = 2.0 * dot(n, view) * n - view;
+  float height = dot(r, g);
+  float lowest = min(0.01, 0.9 * dot(view, g));
+  if (height >= lowest) return n;
+  vec3 middle = view + normalize(r + (lowest - height) * g);
+  float size = length(middle);
+  return size > 0.0 ? middle / size : g;
+}
+
+vec3 reflectedChange(vec3 change, vec3 d, vec3 n, vec3 dNormal) {
+  vec3 r = change - 2.0 * (dot(d, n) * dNormal + (dot(change, n) + dot(d, dNormal)) * n);
+  float size = length(r);
+  return size <= 2.0 ? r : (size < 1e30 ? r * (2.0 / size) : vec3(0.0));
+}
+
+vec4 readShell(int shell, vec3 p, vec3 r, vec3 pdx, vec3 rdx, vec3 pdy, vec3 rdy) {
+  vec3 d = lookupDirection(shell, p, r);
+  vec3 ddx = lookupDirection(shell, p + pdx, r + rdx) - d;
+  vec3 ddy = lookupDirection(shell, p + pdy, r + rdy) - d;
+  float size = uSize[shell];
+  Taps taps = tapsOf(d, ddx, ddy, size);
+  int count = max(2 * taps.pairs, 1);
+  vec4 sum = vec4(0.0);
+  for (int tap = 0; tap < count; ++tap) {
+    float weight = 1.0;
+    vec3 place = d;
+    if (taps.pairs > 0) {
+      int pair = tap >> 1;
+      float offset = (float(pair) + 0.5) * taps.step;
+      place += ((tap & 1) == 0 ? offset : -offset) * taps.longer;
+      weight = (pair + 1 < taps.pairs ? 1.0 : 0.5 * (taps.n - 2.0 * float(taps.pairs - 1))) / taps.n;
+    }
+    if (shell == SHELLS) {
+      sum += weight * vec4(readRadiance(place, taps.level, size, uStaticLayer), 1.0);
+      continue;
+    }
+    for (int node = 0; node < NODES; ++node) {
+      float share = weight * uWeight[node];
+      if (share <= 0.0) continue;
+      sum.rgb += share * readRadiance(place, taps.level, size, uRadianceLayer[node * SHELLS + shell]);
+      float alpha = uAlphaLayer[node * SHELLS + shell];
+      sum.a += share * (alpha < 0.0 ? 1.0 : readAlpha(place, taps.level, size, alpha));
+    }
+  }
+  return sum;
+}
+
+void main() {
+  vec3 toEye = uEye - vPosition;
+  float range = length(toEye);
+  vec3 view = toEye / range;
+  vec3 px = dFdx(vPosition), py = dFdy(vPosition);
+  vec3 nx = dFdx(vNormal), ny = dFdy(vNormal);
+  vec3 g = cross(px, py);
+  g = length(g) > 0.0 ? normalize(g) : view;
+  if (dot(g, view) < 0.0) g = -g;
+  float side = gl_FrontFacing ? 1.0 : -1.0;
+  float normalLength = max(length(vNormal), 1e-6);
+  vec3 n = side * vNormal / normalLength;
+  if (uFlat || dot(n, g) <= 0.0) n = g;
+  n = bend(view, n, g);
+  vec3 d = -view;
+  vec3 r = normalize(2.0 * dot(n, view) * n - view);
+
+  // Ray differentials (Igehy, SIGGRAPH 1999), as the tracer's surface_differential has them. The normal is linear in the
+  // plane of the triangle: two neighbours of any spacing give its change along any step, without a driver's rounding.
+  float slope = 1.0 / dot(d, uForward);  // length of the ray to the image plane at distance 1
+  float cosine = min(dot(d, g), -0.1);
+  vec3 pd[2];
+  vec3 rd[2];
+  float e11 = dot(px, px), e12 = dot(px, py), e22 = dot(py, py);
+  float determinant = e11 * e22 - e12 * e12;
+  for (int i = 0; i < 2; ++i) {
+    vec3 step = i == 0 ? uRight : uDown;
+    vec3 change = (step - dot(step, d) * d) / slope;
+    vec3 travel = range * change;
+    vec3 p = travel - (dot(travel, g) / cosine) * d;
+    p -= dot(p, g) * g;
+    vec3 dNormal = vec3(0.0);
+    if (!uFlat && determinant > 0.0) {
+      float p1 = dot(p, px), p2 = dot(p, py);
+      vec3 dn = (nx * (p1 * e22 - p2 * e12) + ny * (p2 * e11 - p1 * e12)) / determinant / normalLength;
+      dNormal = side * (dn - dot(dn, n) * n);
+    }
+    pd[i] = uFootprint * p;
+    rd[i] = uFootprint * reflectedChange(change, d, n, dNormal);
+  }
+
+  vec3 light = vec3(0.0);
+  if (uPem > 0.0) {
+    float through = 1.0;
+    for (int shell = uStacked ? 0 : SHELLS - 1; shell < SHELLS; ++shell) {
+      vec4 layer = uShellOn[shell] * readShell(shell, vPosition, r, pd[0], rd[0], pd[1], rd[1]);
+      light += through * layer.rgb;
+      through *= 1.0 - layer.a;
+    }
+  }
+  if (uPem < 1.0) {
+    vec3 captured = readShell(SHELLS, vPosition, r, pd[0], rd[0], pd[1], rd[1]).rgb;
+    light = mix(captured, light, uPem);
+  }
+  vec3 f = fresnel(dot(n, view));
+  vec3 body = uDiffuseOn * vDiffuse * (uCoated ? 1.0 - f : vec3(1.0));
+  oColour = vec4(min(light * f + body, 65000.0), 1.0);
+}
+`;
+}
+
+/// A triangle over the whole target.
+export const FULL_VERTEX = `${HEADER}
+out vec2 vUv;
+void main() {
+  vUv = vec2(gl_VertexID == 1 ? 2.0 : 0.0, gl_VertexID == 2 ? 2.0 : 0.0);
+  gl_Position = vec4(2.0 * vUv - 1.0, 1.0, 1.0);
+}
+`;
+
+/// Surroundings behind the object.
+export const BACKGROUND_FRAGMENT = `${HEADER}
+in vec2 vUv;
+out vec4 oColour;
+${READS}
+uniform vec3 uForward;
+uniform vec3 uRight;
+uniform vec3 uDown;
+uniform vec2 uPixels;
+uniform vec2 uPlace;
+uniform float uSize;
+uniform float uStaticLayer;
+uniform vec3 uEye;
+uniform int uShape;
+uniform vec3 uCentre;
+uniform mat3 uProxyFromWorld;
+uniform vec3 uHalfExtent;
+uniform vec3 uOrigin;
+${EXITS}
+uniform vec4 uPlain;  // a: 1: this colour instead of the surroundings
+void main() {
+  if (uPlain.a > 0.0) {
+    oColour = vec4(uPlain.rgb, 0.0);
+    return;
+  }
+  vec2 pixel = vec2(gl_FragCoord.x, uPixels.y - gl_FragCoord.y) - 0.5 + uPlace;
+  vec3 d = uForward + (pixel.x - 0.5 * uPixels.x) * uRight + (pixel.y - 0.5 * uPixels.y) * uDown;
+  vec3 h = leave(uShape, uEye, d, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);
+  vec3 hx = leave(uShape, uEye, d + uRight, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);
+  vec3 hy = leave(uShape, uEye, d + uDown, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);
+  Taps taps = tapsOf(h, hx - h, hy - h, uSize);
+  oColour = vec4(readRadiance(h, taps.level, uSize, uStaticLayer), 0.0);
+}
+`;
+
+/// A ray-traced picture, fitted into the view.
+export const STILL_FRAGMENT = `${HEADER}
+in vec2 vUv;
+out vec4 oColour;
+uniform sampler2D uStill;
+uniform vec2 uScale;  // size of the view in units of the picture
+void main() {
+  vec2 place = (vUv - 0.5) * uScale;
+  oColour = abs(place.x) <= 0.5 && abs(place.y) <= 0.5
+    ? vec4(textureLod(uStill, vec2(0.5 + place.x, 0.5 - place.y), 0.0).rgb, 1.0)
+    : vec4(0.0);
+}
+`;
+
+/// Adds a share of an image to another.
+export const COPY_FRAGMENT = `${HEADER}
+out vec4 oColour;
+uniform sampler2D uImage;
+uniform float uShare;
+void main() {
+  oColour = uShare * texelFetch(uImage, ivec2(gl_FragCoord.xy), 0);
+}
+`;
+
+/// Exposure, tone mapping, sRGB.
+export const DISPLAY_FRAGMENT = `${HEADER}
+out vec4 oColour;
+uniform sampler2D uImage;
+uniform float uExposure;
+uniform bool uNeutral;
+
+// Khronos PBR Neutral Tone Mapper, specification 1.0, 2024.
+vec3 neutral(vec3 colour) {
+  const float start = 0.8 - 0.04;
+  float lowest = min(colour.r, min(colour.g, colour.b));
+  colour -= lowest < 0.08 ? lowest - 6.25 * lowest * lowest : 0.04;
+  float peak = max(colour.r, max(colour.g, colour.b));
+  if (peak < start) return colour;
+  float d = 1.0 - start;
+  float newPeak = 1.0 - d * d / (peak + d - start);
+  colour *= newPeak / peak;
+  float g = 1.0 - 1.0 / (0.15 * (peak - newPeak) + 1.0);
+  return mix(colour, vec3(newPeak), g);
+}
+
+void main() {
+  vec3 c = uExposure * texelFetch(uImage, ivec2(gl_FragCoord.xy), 0).rgb;
+  c = clamp(uNeutral ? neutral(c) : c, 0.0, 1.0);
+  c = mix(12.92 * c, 1.055 * pow(max(c, 1e-9), vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
+  oColour = vec4(c, 1.0);
+}
+`;

@@ -1,0 +1,174 @@
+/// The manifest of a PEM on the web (docs/reference/web-format.md), checked: it may come from anywhere.
+
+import type { RadianceCode } from "./atlas";
+import { UserError } from "./errors";
+
+export type Vec3 = [number, number, number];
+
+export interface ProxyShape {
+  shape: "infinite" | "box" | "ellipsoid" | "hemisphere";
+  origin: Vec3;
+  centre?: Vec3;
+  axes?: [Vec3, Vec3, Vec3];
+  half_extent?: Vec3;
+  radii?: Vec3;
+  radius?: number;
+}
+
+export interface Shell {
+  name: string;
+  size: number;
+  opaque: boolean;
+  proxy: ProxyShape;
+}
+
+export interface MapFiles {
+  radiance: string;
+  alpha: string | null;
+}
+
+export interface Sample {
+  parameter: number[];
+  maps: MapFiles[][];
+  still: string | null;
+}
+
+export interface MeshArray {
+  type: "uint16" | "int16" | "int32" | "float16";
+  components: number;
+  count: number;
+  offset: number;
+}
+
+export interface Manifest {
+  title: string;
+  library: string;
+  notes: string[];
+  runTime: {
+    name: string;
+    places: [number, number][];
+    footprintScale: number;
+    filter: "nearest" | "bilinear" | "trilinear" | "anisotropic";
+    maxTaps: number;
+  };
+  camera: {
+    target: Vec3;
+    radius: number;
+    height: number;
+    startDegrees: number;
+    degrees: number;
+    verticalFovDegrees: number;
+    aspect: number;
+    pixels: number;
+  };
+  material: { fresnel: string; r0: Vec3; eta: Vec3; k: Vec3; coated: boolean };
+  radiance: RadianceCode;
+  images: { suffix: string; type: string; exact: boolean; fallback: boolean };
+  probe: { file: string; colours: number[][] };
+  poster: { file: string; type: string };
+  mesh: {
+    file: string;
+    bounds: { low: Vec3; high: Vec3 };
+    arrays: { [name: string]: MeshArray };
+    parts: { start: number; stacked: number; count: number }[];
+    bytes: number;
+  };
+  parts: { name: string; shells: Shell[] }[];
+  static: { image: string; size: number; proxy: ProxyShape };
+  samples: Sample[];
+  first: number;
+}
+
+const LARGEST_MESH = 1 << 30;
+
+function damaged(what: string): never {
+  throw new UserError("damaged", `The file manifest.json is damaged: ${what}.`);
+}
+
+function isSize(n: unknown): n is number {
+  return typeof n === "number" && n >= 1 && n <= 4096 && Number.isInteger(Math.log2(n));
+}
+
+function isVector(v: unknown): v is Vec3 {
+  return Array.isArray(v) && v.length === 3 && v.every(Number.isFinite);
+}
+
+function isName(name: unknown): name is string {
+  return (
+    typeof name === "string" &&
+    /^[\w.\-/]+$/.test(name) &&
+    !name.startsWith("/") &&
+    !name.split("/").includes("..")
+  );
+}
+
+function checkProxy(proxy: ProxyShape, where: string): void {
+  const number = (x: unknown) => typeof x === "number" && Number.isFinite(x) && x > 0;
+  const positive = (v: unknown) => isVector(v) && v.every(number);
+  const placed = isVector(proxy?.centre) && Array.isArray(proxy.axes) && proxy.axes.every(isVector);
+  const valid =
+    isVector(proxy?.origin) &&
+    (proxy.shape === "infinite" ||
+      (placed && proxy.shape === "box" && positive(proxy.half_extent)) ||
+      (placed && proxy.shape === "ellipsoid" && positive(proxy.radii)) ||
+      (placed && proxy.shape === "hemisphere" && number(proxy.radius)));
+  if (!valid) damaged(`the geometry of ${where} is not one that this page knows`);
+}
+
+/// Parses and checks a manifest; throws UserError.
+export function parseManifest(text: string): Manifest {
+  let data: Manifest & { format?: string; version?: number };
+  try {
+    data = JSON.parse(text);
+  } catch {
+    return damaged("it is not JSON");
+  }
+  if (data?.format !== "mirrorbake-web") damaged("it is not that of a PEM");
+  if (data.version !== 1) {
+    throw new UserError(
+      "version",
+      `These files are of version ${data.version} of the format; this page shows version 1. Export them again.`,
+    );
+  }
+  if (!Array.isArray(data.parts) || data.parts.length < 1) damaged("it has no parts");
+  if (!Array.isArray(data.samples) || data.samples.length < 1) damaged("it has no samples");
+  for (const part of data.parts) {
+    if (!Array.isArray(part.shells) || part.shells.length < 1) damaged(`part ${part.name} has no shells`);
+    for (const shell of part.shells) {
+      if (!isSize(shell.size)) damaged(`the size of shell ${shell.name} is ${shell.size}`);
+      checkProxy(shell.proxy, `shell ${shell.name}`);
+    }
+  }
+  for (const sample of data.samples) {
+    const fits =
+      Array.isArray(sample.parameter) &&
+      sample.parameter.every(Number.isFinite) &&
+      Array.isArray(sample.maps) &&
+      sample.maps.length === data.parts.length &&
+      sample.maps.every(
+        (maps, p) =>
+          Array.isArray(maps) &&
+          maps.length === data.parts[p].shells.length &&
+          maps.every((m) => isName(m.radiance) && (m.alpha === null || isName(m.alpha))),
+      ) &&
+      (sample.still === null || isName(sample.still));
+    if (!fits) damaged("a sample does not have the maps of all parts and shells");
+  }
+  if (!isSize(data.static?.size) || !isName(data.static.image)) damaged("the static map is not described");
+  checkProxy(data.static.proxy, "the static map");
+  const mesh = data.mesh;
+  if (!isName(mesh?.file) || !(mesh.bytes >= 0 && mesh.bytes <= LARGEST_MESH))
+    damaged("the mesh is not described");
+  for (const name of ["positions", "indices"]) {
+    if (!mesh.arrays?.[name]) damaged(`the mesh has no ${name}`);
+  }
+  if (!isVector(mesh.bounds?.low) || !isVector(mesh.bounds?.high)) damaged("the mesh has no bounds");
+  if (!Array.isArray(mesh.parts) || mesh.parts.length !== data.parts.length)
+    damaged("the mesh has other parts");
+  if (!isName(data.probe?.file) || !isName(data.poster?.file)) damaged("the poster is not described");
+  if (!Array.isArray(data.runTime?.places) || data.runTime.places.length < 1)
+    damaged("it has no run-time model");
+  if (!isVector(data.camera?.target) || !(data.camera.radius >= 0)) damaged("it has no camera");
+  if (!(data.first >= 0 && data.first < data.samples.length)) data.first = 0;
+  return data;
+}

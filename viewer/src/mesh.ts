@@ -1,0 +1,67 @@
+/// The mesh file (mesh_file.py): gzip over arrays whose bytes are sorted by significance.
+
+import { UserError } from "./errors";
+import type { Manifest, MeshArray } from "./manifest";
+
+export interface Mesh {
+  positions: Uint16Array;
+  normals: Int16Array | null;
+  diffuse: Uint16Array | null;
+  indices: Uint32Array;
+}
+
+async function inflate(bytes: ArrayBuffer): Promise<Uint8Array> {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+const BYTES = { uint16: 2, int16: 2, float16: 2, int32: 4 };
+
+/// An array whose components lie one after the other in planes of bytes, put back in order.
+export function gather(payload: Uint8Array, array: MeshArray): ArrayBuffer {
+  const { components, count, offset } = array;
+  const size = BYTES[array.type];
+  if (!size || !(count >= 0) || !(components >= 1) || offset + size * components * count > payload.length) {
+    throw new UserError("damaged", "The mesh's file is damaged: an array reaches beyond its end.");
+  }
+  const result = new Uint8Array(size * components * count);
+  for (let c = 0; c < components; ++c) {
+    for (let b = 0; b < size; ++b) {
+      let from = offset + (c * size + b) * count;
+      for (let to = c * size + b; to < result.length; to += components * size) result[to] = payload[from++];
+    }
+  }
+  return result.buffer;
+}
+
+export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Promise<Mesh> {
+  let payload: Uint8Array;
+  try {
+    payload = await inflate(file);
+  } catch {
+    throw new UserError("damaged", "The mesh's file is damaged: it does not decompress.");
+  }
+  if (payload.length !== mesh.bytes) {
+    throw new UserError("damaged", "The mesh's file is damaged: it has another length than it should.");
+  }
+  const { positions, indices, normals, diffuse } = mesh.arrays;
+  const differences = new Int32Array(gather(payload, indices));
+  const result = new Uint32Array(differences.length);
+  let index = 0;
+  for (let i = 0; i < result.length; ++i) {
+    index += differences[i];
+    if (index < 0 || index >= positions.count) {
+      throw new UserError(
+        "damaged",
+        "The mesh's file is damaged: a triangle has a vertex that does not exist.",
+      );
+    }
+    result[i] = index;
+  }
+  return {
+    positions: new Uint16Array(gather(payload, positions)),
+    normals: normals ? new Int16Array(gather(payload, normals)) : null,
+    diffuse: diffuse ? new Uint16Array(gather(payload, diffuse)) : null,
+    indices: result,
+  };
+}

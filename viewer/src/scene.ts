@@ -1,0 +1,317 @@
+/// Everything that is loaded, and one picture of it: the viewer without its controls.
+
+import { SampleCache } from "./cache";
+import { Decoder, sameColours } from "./decoder";
+import { UserError } from "./errors";
+import { type Files, textOf } from "./files";
+import { type FrameState, Renderer } from "./gl/renderer";
+import { type Manifest, parseManifest, type Vec3 } from "./manifest";
+import { cross, normalize, placeCamera, scale, subtract, type View } from "./math";
+import { decodeMesh, type Mesh } from "./mesh";
+import type { Settings } from "./state";
+
+export const BUDGET_BYTES = 96e6;
+
+/// Distance of the eyes in stereo as a share of the distance to the object; the comfortable thirtieth of stereo photography.
+const EYES_APART = 1 / 30;
+
+export interface Events {
+  /// Something new can be drawn.
+  changed(): void;
+  progress(text: string, share: number): void;
+  failed(failure: unknown): void;
+}
+
+export class Scene {
+  readonly decoder = new Decoder();
+  renderer: Renderer;
+  cache: SampleCache;
+  private exact: boolean;
+  private stillShown = -1;
+  private stillWanted = -1;
+  private readonly frame: FrameState;
+  private hasStatic = false;
+
+  private constructor(
+    private gl: WebGL2RenderingContext,
+    readonly manifest: Manifest,
+    private readonly mesh: Mesh,
+    private readonly files: Files,
+    private readonly events: Events,
+    exact: boolean,
+    private readonly budget: number,
+  ) {
+    this.exact = exact;
+    this.renderer = new Renderer(gl, manifest, mesh, budget);
+    this.cache = this.makeCache();
+    const { runTime } = manifest;
+    this.frame = {
+      width: 1,
+      height: 1,
+      view: {
+        eye: [0, 0, 1],
+        forward: [0, 0, -1],
+        right: [1, 0, 0],
+        down: [0, -1, 0],
+        clipFromWorld: new Float32Array(16),
+      },
+      places: runTime.places,
+      footprint: runTime.footprintScale,
+      maxTaps: runTime.filter === "anisotropic" ? runTime.maxTaps : 1,
+      left: "pem",
+      right: "pem",
+      divider: 0,
+      slots: this.cache.slotsOfBlend,
+      weights: this.cache.blend.weights,
+      pem: 0,
+      shellsOn: [],
+      fresnelOn: true,
+      diffuseOn: true,
+      background: "surroundings",
+      plain: [0.18, 0.18, 0.18],
+      exposure: 1,
+      neutral: true,
+      stillScale: [1, 1],
+    };
+  }
+
+  static async load(
+    makeContext: () => WebGL2RenderingContext,
+    files: Files,
+    events: Events,
+    onPoster: (url: string) => void,
+    budget = BUDGET_BYTES,
+  ): Promise<Scene> {
+    events.progress("Loading the description", 0.02);
+    const manifest = parseManifest(textOf(await files.read("manifest.json")));
+    const poster = await files.read(manifest.poster.file);
+    onPoster(URL.createObjectURL(new Blob([poster], { type: manifest.poster.type })));
+    const gl = makeContext();
+    const decoder = new Decoder();
+    const exact = await chooseFormat(manifest, files, decoder);
+    events.progress("Loading the shape", 0.1);
+    const mesh = await decodeMesh(await files.read(manifest.mesh.file), manifest.mesh);
+    const scene = new Scene(gl, manifest, mesh, files, events, exact, budget);
+    await scene.loadStatic();
+    return scene;
+  }
+
+  /// After a lost context came back.
+  async restore(): Promise<void> {
+    this.renderer = new Renderer(this.gl, this.manifest, this.mesh, this.budget);
+    this.cache.forget();
+    this.stillShown = -1;
+    this.hasStatic = false;
+    await this.loadStatic();
+  }
+
+  /// Vertical field of view in radians: the views', or more in an image that is narrower than they are.
+  fieldOfView(aspect: number): number {
+    const { verticalFovDegrees, aspect: own } = this.manifest.camera;
+    const half = Math.tan((verticalFovDegrees * Math.PI) / 360);
+    return 2 * Math.atan(half * Math.max(1, own / aspect));
+  }
+
+  eye(s: Settings): Vec3 {
+    const azimuth = (s.azimuth * Math.PI) / 180;
+    const elevation = (s.elevation * Math.PI) / 180;
+    const [x, y, z] = this.manifest.camera.target;
+    const flat = s.distance * Math.cos(elevation);
+    return [x + flat * Math.sin(azimuth), y + s.distance * Math.sin(elevation), z + flat * Math.cos(azimuth)];
+  }
+
+  /// Parameter of the arc that belongs to a direction of view, not limited to the arc.
+  parameterOf(azimuth: number): number {
+    const { startDegrees, degrees } = this.manifest.camera;
+    if (degrees === 0) return 0;
+    const middle = startDegrees + 0.5 * degrees;
+    const turned = ((((azimuth - middle + 180) % 360) + 360) % 360) - 180;
+    return (turned + 0.5 * degrees) / degrees;
+  }
+
+  azimuthOf(parameter: number): number {
+    const { startDegrees, degrees } = this.manifest.camera;
+    return startDegrees + parameter * degrees;
+  }
+
+  /// Sets what is drawn and starts to fetch what is missing for it.
+  prepare(s: Settings, speed: number): void {
+    this.cache.update(this.parameterOf(s.azimuth), speed, !s.blended);
+    if (s.compare === "raytraced") this.wantStill(this.nearestSample(s));
+  }
+
+  nearestSample(s: Settings): number {
+    const t = this.parameterOf(s.azimuth);
+    let best = 0;
+    this.manifest.samples.forEach((sample, i) => {
+      const d = Math.abs(sample.parameter[0] - t);
+      if (d < Math.abs(this.manifest.samples[best].parameter[0] - t)) best = i;
+    });
+    return best;
+  }
+
+  draw(s: Settings, width: number, height: number): void {
+    if (!s.stereo) {
+      this.renderer.draw(this.frameOf(s, width, height, 0));
+      return;
+    }
+    const half = Math.floor(width / 2);
+    this.renderer.draw(this.frameOf(s, half, height, -1), 0);
+    this.renderer.draw(this.frameOf(s, half, height, 1), half);
+  }
+
+  /// Scene-linear light, and the object's coverage in alpha, from the lower left corner.
+  readLinear(s: Settings, width: number, height: number): Float32Array {
+    return this.renderer.readLinear(this.frameOf(s, width, height, 0));
+  }
+
+  /// `side`: -1 left eye, 1 right eye, 0 both.
+  private frameOf(s: Settings, width: number, height: number, side: number): FrameState {
+    const { frame } = this;
+    const { camera, runTime, mesh } = this.manifest;
+    const fov = this.fieldOfView(width / height);
+    let eye = this.eye(s);
+    let { target } = camera;
+    if (side !== 0) {
+      const right = normalize(cross(subtract(target, eye), [0, 1, 0]));
+      const offset = scale(0.5 * side * EYES_APART * s.distance, right);
+      eye = [eye[0] + offset[0], eye[1] + offset[1], eye[2] + offset[2]];
+      target = [...target];
+    }
+    const { low, high } = mesh.bounds;
+    const radius = Math.hypot(...subtract(high, low));
+    const near = Math.max(s.distance - 2 * radius, 0.01 * s.distance);
+    placeCamera(frame.view as View, eye, target, fov, width, height, near, s.distance + 2 * radius);
+    frame.width = width;
+    frame.height = height;
+    frame.places = s.lookups === 4 ? (runTime.places.length > 1 ? runTime.places : GRID) : CENTRE;
+    const lookups = Math.max(runTime.places.length, 1);
+    frame.footprint = (runTime.footprintScale * Math.sqrt(lookups)) / Math.sqrt(frame.places.length);
+    frame.left = "pem";
+    const still = this.stillShown >= 0 && this.stillShown === this.stillWanted;
+    frame.right = s.compare === "static" ? "static" : s.compare === "raytraced" && still ? "still" : "pem";
+    frame.divider = s.compare === "off" ? width : s.divider * width;
+    frame.pem = this.cache.share;
+    frame.shellsOn = s.shells;
+    frame.fresnelOn = s.fresnel;
+    frame.diffuseOn = s.diffuse;
+    frame.background = this.hasStatic ? s.background : "plain";
+    frame.exposure = 2 ** s.exposure;
+    frame.neutral = s.toneMapping === "neutral";
+    const growth = Math.tan(0.5 * fov) / Math.tan((camera.verticalFovDegrees * Math.PI) / 360);
+    frame.stillScale[0] = (growth * width) / height / camera.aspect;
+    frame.stillScale[1] = growth;
+    return frame;
+  }
+
+  private makeCache(): SampleCache {
+    return new SampleCache(
+      this.manifest.samples.map((sample) => sample.parameter[0]),
+      this.renderer.pool.capacity,
+      (sample, slot) => this.loadSample(sample, slot),
+      () => this.events.changed(),
+      (_, failure) => this.events.failed(failure),
+    );
+  }
+
+  private image(name: string): { file: string; type: string } {
+    if (this.exact && this.manifest.images.fallback)
+      return { file: `exact/${name}.webp`, type: "image/webp" };
+    return { file: name + this.manifest.images.suffix, type: this.manifest.images.type };
+  }
+
+  private async loadStatic(): Promise<void> {
+    const { image, size } = this.manifest.static;
+    const { file, type } = this.image(image);
+    const bytes = await this.files.read(file);
+    this.events.progress("Loading the surroundings", 0.3);
+    const { renderer } = this;
+    const code = this.manifest.radiance;
+    const { packed } = await this.decoder.decode(file, { kind: "radiance", bytes, type, size, code });
+    if (packed && renderer === this.renderer) renderer.uploadStatic(packed);
+    this.hasStatic = true;
+    this.events.changed();
+  }
+
+  private async loadSample(sample: number, slot: number): Promise<void> {
+    const { renderer } = this;
+    const code = this.manifest.radiance;
+    const jobs = this.manifest.samples[sample].maps.flatMap((maps, part) =>
+      maps.map(async (map, shell) => {
+        const { size } = this.manifest.parts[part].shells[shell];
+        const radiance = this.image(map.radiance);
+        const alpha = map.alpha === null ? null : this.image(map.alpha);
+        const [light, cover] = await Promise.all([
+          this.files.read(radiance.file).then((bytes) =>
+            this.decoder.decode(radiance.file, {
+              kind: "radiance",
+              bytes,
+              type: radiance.type,
+              size,
+              code,
+            }),
+          ),
+          alpha &&
+            this.files
+              .read(alpha.file)
+              .then((bytes) =>
+                this.decoder.decode(alpha.file, { kind: "alpha", bytes, type: alpha.type, size }),
+              ),
+        ]);
+        if (renderer !== this.renderer || !light.packed) return;
+        renderer.uploadMap(slot, part, shell, light.packed, cover?.alpha);
+      }),
+    );
+    await Promise.all(jobs);
+  }
+
+  private wantStill(sample: number): void {
+    const name = this.manifest.samples[sample].still;
+    if (name === null || sample === this.stillWanted) return;
+    this.stillWanted = sample;
+    const { file, type } = this.image(name);
+    const { renderer } = this;
+    this.files
+      .read(file)
+      .then((bytes) =>
+        this.decoder.decode(file, { kind: "still", bytes, type, code: this.manifest.radiance }),
+      )
+      .then(
+        ({ width, height, packed }) => {
+          if (sample !== this.stillWanted || renderer !== this.renderer || !packed) return;
+          renderer.uploadStill(width, height, packed);
+          this.stillShown = sample;
+          this.events.changed();
+        },
+        (failure) => this.events.failed(failure),
+      );
+  }
+}
+
+const CENTRE: [number, number][] = [[0.5, 0.5]];
+
+/// The rotated grid.
+const GRID: [number, number][] = [
+  [0.375, 0.125],
+  [0.875, 0.375],
+  [0.125, 0.625],
+  [0.625, 0.875],
+];
+
+/// Whether the exact images are needed because this browser shows the others wrongly.
+async function chooseFormat(manifest: Manifest, files: Files, decoder: Decoder): Promise<boolean> {
+  const { images, probe } = manifest;
+  try {
+    const bytes = await files.read(probe.file);
+    const { colours } = await decoder.decode(probe.file, { kind: "probe", bytes, type: images.type });
+    if (colours && sameColours(colours, probe.colours)) return false;
+  } catch (failure) {
+    if (failure instanceof UserError && failure.kind === "missing") throw failure;
+  }
+  if (images.fallback) return true;
+  const kind = images.type === "image/avif" ? "AVIF" : "WebP";
+  throw new UserError(
+    "codec",
+    `This browser does not show ${kind} images as they are. A newer browser does; or export the PEM with --exact.`,
+  );
+}

@@ -25,6 +25,7 @@ from mirrorbake.pem.export.radiance_code import RadianceCode
 from mirrorbake.pem.export.source import ExportSource, Part, Shell
 from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.proxy import proxy_to_attributes
+from mirrorbake.scene.parameters import Axis, ParameterSpace
 from mirrorbake.viewer.export import write_folder
 
 if TYPE_CHECKING:
@@ -127,7 +128,7 @@ class Scene:
     albedo: float
 
 
-def _scene(case: Case) -> Scene:
+def case_scene(case: Case) -> Scene:
     torus, ball = (
         _core.make_torus((0.0, 0.1, 0.0), 0.12, 0.04, 40),
         _core.make_sphere((0.0, 0.13, 0.0), 0.06, 32),
@@ -200,7 +201,8 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
     )
     return ExportSource(
         parts=parts,
-        parameters=PARAMETERS,
+        space=ParameterSpace((Axis("arc", PARAMETERS, 0.0, 1.0),)),
+        motion=None,
         pyramid=pem.pyramid,
         still=lambda sample: np.full((HEIGHT, WIDTH, 3), 0.2 + 0.2 * sample, np.float32),
         mesh=scene.mesh,
@@ -263,7 +265,7 @@ def reference(case: Case, scene: Scene, pem: CasePem, code: RadianceCode, t: flo
 
 def write_case(case: Case, folder: Path, image_format: ImageFormat) -> None:
     """Write the export and the reference pictures of a case."""
-    scene, pem = _scene(case), CasePem()
+    scene, pem = case_scene(case), CasePem()
     source = case_source(case, scene, pem)
     web = WebPem(source, WebOptions(image_format))
     write_folder(web, case.name, folder, lambda done, total, text: None)

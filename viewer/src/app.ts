@@ -19,7 +19,7 @@ export class App {
   private home!: Settings;
   private playing = false;
   private direction = 1;
-  private speed = 0;
+  private velocity: number[] = [];
   private dirty = true;
   private lastFrame = 0;
   private meanFrame = 0;
@@ -33,7 +33,7 @@ export class App {
   ) {
     this.controls = new Controls({
       change: (change) => this.change(change),
-      parameter: (value) => this.turnTo(value),
+      coordinate: (axis, value) => this.moveTo(axis, value),
       play: () => this.play(),
       fullscreen: () => this.fullscreen(),
       screenshot: () => void this.screenshot(),
@@ -67,12 +67,14 @@ export class App {
 
   private begin(scene: Scene): void {
     const { controls } = this;
-    const { camera, samples, first, parts } = scene.manifest;
+    const { axes, camera, samples, first, parts } = scene.manifest;
     controls.fill(scene.manifest);
     const shells = Math.max(...parts.map((part) => part.shells.length));
+    this.velocity = axes.map(() => 0);
     this.home = {
-      azimuth: scene.azimuthOf(samples[first].parameter[0]),
+      azimuth: camera.startDegrees,
       elevation: (Math.atan2(camera.height, camera.radius) * 180) / Math.PI,
+      place: {},
       distance: Math.hypot(camera.radius, camera.height),
       compare: "off",
       divider: 0.5,
@@ -87,6 +89,9 @@ export class App {
       stereo: false,
       theme: "auto",
     };
+    axes.forEach((axis, a) => {
+      Object.assign(this.home, scene.at(this.home, axis, samples[first].parameter[a]));
+    });
     this.settings = fromLink(location.hash, this.home);
     this.scene = scene;
     listen(controls.canvas, controls.divider, {
@@ -96,7 +101,11 @@ export class App {
       dividerShare: () => this.settings.divider,
       play: () => this.play(),
       reset: () => this.reset(),
-      step: (count) => this.turnTo(scene.parameterOf(this.settings.azimuth) + 0.05 * count),
+      step: (count) => {
+        if (axes.length === 0) return;
+        const { low, high } = axes[0];
+        this.moveTo(0, scene.coordinate(this.settings, axes[0]) + 0.05 * count * (high - low));
+      },
     });
     window.addEventListener("hashchange", () => {
       this.settings = fromLink(location.hash, this.settings);
@@ -147,12 +156,7 @@ export class App {
     s.distance = clamp(s.distance, 0.35 * home.distance, 4 * home.distance);
     s.divider = clamp(s.divider, 0, 1);
     s.exposure = clamp(s.exposure, -6, 6);
-    // Ray tracing was done from the arc alone.
-    if (s.compare === "raytraced") {
-      s.elevation = home.elevation;
-      s.distance = home.distance;
-      s.azimuth = this.scene.azimuthOf(this.scene.manifest.samples[this.scene.nearestSample(s)].parameter[0]);
-    }
+    if (s.compare === "raytraced") this.snap(this.scene.nearestSample(s));
     this.redraw();
     window.clearTimeout(this.linkTimer);
     this.linkTimer = window.setTimeout(() => this.keepLink(), 300);
@@ -166,22 +170,42 @@ export class App {
     }
   }
 
+  /// Ray tracing was done at the samples alone.
+  private snap(sample: number): void {
+    const { scene, settings, home } = this;
+    if (!scene) return;
+    settings.elevation = home.elevation;
+    settings.azimuth = home.azimuth;
+    settings.distance = home.distance;
+    const { axes, samples } = scene.manifest;
+    axes.forEach((axis, a) => {
+      Object.assign(settings, scene.at(settings, axis, samples[sample].parameter[a]));
+    });
+  }
+
   private turn(dx: number, dy: number): void {
-    const { azimuth, elevation, compare } = this.settings;
-    this.speed = -Math.sign(dx);
-    if (compare === "raytraced") {
+    const { scene, settings } = this;
+    if (!scene) return;
+    const { axes, camera } = scene.manifest;
+    const alongArc = Math.sign(camera.degrees) || 1;
+    axes.forEach((axis, a) => {
+      if (axis.name === "arc") this.velocity[a] = -Math.sign(dx) * alongArc;
+      if (axis.name === "azimuth") this.velocity[a] = -Math.sign(dx);
+      if (axis.name === "elevation") this.velocity[a] = Math.sign(dy);
+    });
+    if (settings.compare === "raytraced") {
       this.stepSamples(-dx);
       return;
     }
     this.change({
-      azimuth: azimuth - dx * DEGREES_PER_PIXEL,
-      elevation: elevation + dy * DEGREES_PER_PIXEL,
+      azimuth: settings.azimuth - dx * DEGREES_PER_PIXEL,
+      elevation: settings.elevation + dy * DEGREES_PER_PIXEL,
     });
   }
 
   private pulled = 0;
 
-  /// From sample to sample: half a step's way of the hand turns to the next.
+  /// From sample to sample: so many pixels of the hand's way turn to the next.
   private stepSamples(pixels: number): void {
     const { scene } = this;
     if (!scene) return;
@@ -190,16 +214,16 @@ export class App {
     if (steps === 0) return;
     this.pulled -= 24 * steps;
     const { samples } = scene.manifest;
-    const next = clamp(scene.nearestSample(this.settings) + steps, 0, samples.length - 1);
-    this.change({ azimuth: scene.azimuthOf(samples[next].parameter[0]) });
+    this.snap(clamp(scene.nearestSample(this.settings) + steps, 0, samples.length - 1));
+    this.change({});
   }
 
-  private turnTo(parameter: number): void {
+  private moveTo(a: number, value: number): void {
     const { scene } = this;
     if (!scene) return;
-    const before = scene.parameterOf(this.settings.azimuth);
-    this.speed = Math.sign(parameter - before);
-    this.change({ azimuth: scene.azimuthOf(clamp(parameter, 0, 1)) });
+    const axis = scene.manifest.axes[a];
+    this.velocity[a] = Math.sign(value - scene.coordinate(this.settings, axis));
+    this.change(scene.at(this.settings, axis, clamp(value, axis.low, axis.high)));
   }
 
   private play(): void {
@@ -209,8 +233,8 @@ export class App {
   }
 
   private reset(): void {
-    const { azimuth, elevation, distance } = this.home;
-    this.change({ azimuth, elevation, distance, exposure: 0 });
+    const { azimuth, elevation, distance, place } = this.home;
+    this.change({ azimuth, elevation, distance, place: { ...place }, exposure: 0 });
   }
 
   private fullscreen(): void {
@@ -254,27 +278,29 @@ export class App {
       return;
     }
     this.dirty = false;
-    scene.prepare(this.settings, this.speed);
+    scene.prepare(this.settings, this.velocity);
     this.paint();
     if (this.playing && elapsed < 1000) {
       this.meanFrame = this.meanFrame === 0 ? elapsed : 0.9 * this.meanFrame + 0.1 * elapsed;
       this.controls.fps.textContent = `${this.meanFrame.toFixed(1)} ms`;
     }
-    this.controls.show(
-      this.settings,
-      scene.parameterOf(this.settings.azimuth),
-      this.controls.canvas.clientWidth,
-    );
+    this.controls.show(this.settings, scene.point(this.settings), this.controls.canvas.clientWidth);
     this.showProgress(scene);
   }
 
   private advance(scene: Scene, seconds: number): void {
-    let t = clamp(scene.parameterOf(this.settings.azimuth), 0, 1);
-    t += this.direction * PLAY_SPEED * Math.min(seconds, 0.1);
-    if (t >= 1 || t <= 0) this.direction = t >= 1 ? -1 : 1;
-    this.speed = this.direction;
-    this.settings.azimuth = scene.azimuthOf(clamp(t, 0, 1));
+    const axis = scene.manifest.axes[0];
+    if (!axis) return;
+    const span = axis.high - axis.low;
+    const before = clamp(scene.coordinate(this.settings, axis), axis.low, axis.high);
+    const value = before + this.direction * PLAY_SPEED * span * Math.min(seconds, 0.1);
+    if (axis.period === null && (value >= axis.high || value <= axis.low)) {
+      this.direction = value >= axis.high ? -1 : 1;
+    }
+    this.velocity[0] = this.direction;
     if (this.settings.compare === "raytraced") this.settings.compare = "off";
+    const next = axis.period === null ? clamp(value, axis.low, axis.high) : value;
+    Object.assign(this.settings, scene.at(this.settings, axis, next));
     this.redraw();
   }
 

@@ -1,6 +1,7 @@
 /// Which samples are on the GPU, and which to fetch next.
 
-import { type Blend, neighbours, wanted } from "./space";
+import type { Axis } from "./manifest";
+import { type Blend, neighbours, nodeCount, wanted } from "./space";
 
 interface Slot {
   sample: number; // -1: empty
@@ -18,19 +19,23 @@ export class SampleCache {
   private loading = 0;
   private generation = 0;
   /// What is drawn: slots and weights; `share` is 0 while nothing is there.
-  readonly blend: Blend = { indices: [0, 0], weights: [1, 0] };
-  readonly slotsOfBlend = [0, 0];
+  readonly blend: Blend;
+  readonly slotsOfBlend: number[];
   share = 0;
   private order: number[] = [];
   private orderKey = "";
 
   constructor(
-    private readonly parameters: number[],
+    private readonly axes: Axis[],
+    private readonly samples: number[][],
     capacity: number,
     private readonly load: Load,
     private readonly changed: () => void,
     private readonly fail: (sample: number, failure: unknown) => void,
   ) {
+    const nodes = nodeCount(axes);
+    this.blend = { indices: Array(nodes).fill(0), weights: Array(nodes).fill(0) };
+    this.slotsOfBlend = Array(nodes).fill(0);
     this.slots = Array.from({ length: capacity }, () => ({ sample: -1, ready: false }));
   }
 
@@ -43,24 +48,23 @@ export class SampleCache {
     return this.slots.some((s) => s.ready && s.sample === sample);
   }
 
-  /// Sets what is drawn at `value` and starts to fetch what is missing. Allocates nothing while the value stays between the
-  /// same two samples.
-  update(value: number, speed: number, nearest: boolean): void {
-    neighbours(this.parameters, value, nearest, this.blend);
+  /// Sets what is drawn at a point and starts to fetch what is missing; `velocity` has a sign per axis.
+  update(point: number[], velocity: number[], nearest: boolean): void {
+    neighbours(this.axes, point, nearest, this.blend);
     let total = 0;
-    for (let k = 0; k < 2; ++k) {
+    for (let k = 0; k < this.slotsOfBlend.length; ++k) {
       const slot = this.slotOf(this.blend.indices[k]);
       this.slotsOfBlend[k] = Math.max(slot, 0);
       if (slot < 0) this.blend.weights[k] = 0;
       total += this.blend.weights[k];
     }
     if (total > 0) {
-      for (let k = 0; k < 2; ++k) this.blend.weights[k] /= total;
+      for (let k = 0; k < this.slotsOfBlend.length; ++k) this.blend.weights[k] /= total;
       this.share = 1;
     } else {
-      this.drawNearest(value);
+      this.drawNearest(point);
     }
-    this.fetch(value, speed);
+    this.fetch(point, velocity);
   }
 
   /// After a lost context: nothing is there any more.
@@ -81,30 +85,31 @@ export class SampleCache {
     return -1;
   }
 
-  private drawNearest(value: number): void {
+  private drawNearest(point: number[]): void {
     let best = -1;
     let distance = Number.POSITIVE_INFINITY;
     for (let i = 0; i < this.slots.length; ++i) {
       if (!this.slots[i].ready) continue;
-      const d = Math.abs(this.parameters[this.slots[i].sample] - value);
+      const sample = this.samples[this.slots[i].sample];
+      let d = 0;
+      for (let a = 0; a < point.length; ++a) d += Math.abs(sample[a] - point[a]);
       if (d < distance) {
         best = i;
         distance = d;
       }
     }
     this.share = best >= 0 ? 1 : 0;
-    this.slotsOfBlend[0] = Math.max(best, 0);
-    this.slotsOfBlend[1] = this.slotsOfBlend[0];
+    this.slotsOfBlend.fill(Math.max(best, 0));
+    this.blend.weights.fill(0);
     this.blend.weights[0] = 1;
-    this.blend.weights[1] = 0;
   }
 
-  private fetch(value: number, speed: number): void {
+  private fetch(point: number[], velocity: number[]): void {
     if (this.loading >= AT_ONCE) return;
-    const key = `${this.blend.indices[0]}/${this.blend.indices[1]}/${Math.sign(speed)}`;
+    const key = `${this.blend.indices.join()}/${velocity.join()}`;
     if (key !== this.orderKey) {
       this.orderKey = key;
-      this.order = wanted(this.parameters, value, speed, this.slots.length);
+      this.order = wanted(this.axes, this.samples, point, velocity, this.slots.length);
     }
     for (const sample of this.order) {
       if (this.loading >= AT_ONCE) return;

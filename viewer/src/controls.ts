@@ -1,13 +1,21 @@
 /// The page's elements: made once, wired to the settings.
 
-import type { Manifest } from "./manifest";
+import type { Axis, Manifest } from "./manifest";
 import type { Settings } from "./state";
 
 type Change = Partial<Settings>;
 
+const AXES: { [name: string]: string } = {
+  arc: "View along the arc",
+  azimuth: "Azimuth of the view, degrees",
+  elevation: "Elevation of the view, degrees",
+  motion: "Motion of the object",
+  light: "Turn of the light",
+};
+
 export interface Actions {
   change(change: Change): void;
-  parameter(value: number): void;
+  coordinate(axis: number, value: number): void;
   play(): void;
   fullscreen(): void;
   screenshot(): void;
@@ -48,14 +56,9 @@ export class Controls {
     "aria-valuemin": "0",
     "aria-valuemax": "100",
   });
-  readonly parameter = element("input", {
-    type: "range",
-    id: "parameter",
-    min: "0",
-    max: "1",
-    step: "any",
-    "aria-label": "View along the arc",
-  });
+  /// One for every axis that has more than one sample.
+  readonly sliders: { axis: number; input: HTMLInputElement }[] = [];
+  private readonly footer: HTMLElement;
   readonly playButton: HTMLButtonElement;
   readonly fps = element("output", { id: "frame-time", "aria-label": "Frame time" });
   private readonly status = element("div", { class: "status", role: "status", "aria-live": "polite" });
@@ -72,6 +75,8 @@ export class Controls {
     menu.setAttribute("aria-controls", "panel");
     menu.setAttribute("aria-expanded", "false");
     this.panel.hidden = true;
+    this.footer = element("footer", {}, [this.playButton]);
+    this.footer.hidden = true;
     this.root = element("main", { class: "viewer" }, [
       this.canvas,
       this.poster,
@@ -79,19 +84,21 @@ export class Controls {
       this.divider,
       element("header", {}, [this.title, this.fps, menu]),
       this.panel,
-      element("footer", {}, [this.playButton, this.parameter]),
+      this.footer,
       element("div", { class: "messages" }, [this.bar, this.status]),
       this.alert,
     ]);
     this.divider.hidden = true;
-    this.parameter.addEventListener("input", () => actions.parameter(this.parameter.valueAsNumber));
   }
 
   /// The settings that a PEM has.
   fill(manifest: Manifest): void {
     this.title.textContent = manifest.title;
     document.title = `${manifest.title} – mirrorbake`;
-    const { change } = this.actions;
+    manifest.axes.forEach((axis, number) => {
+      if (axis.high > axis.low) this.addSlider(axis, number);
+    });
+    this.footer.hidden = this.sliders.length === 0;
     const hasStills = manifest.samples.some((sample) => sample.still !== null);
     const shells: string[] = [];
     for (const part of manifest.parts) {
@@ -178,15 +185,28 @@ export class Controls {
         `mirrorbake ${manifest.library}`,
       ]),
     );
-    void change;
   }
 
-  show(s: Settings, parameter: number, width: number): void {
+  private addSlider(axis: Axis, number: number): void {
+    const label = AXES[axis.name] ?? axis.name;
+    const { low, high } = axis;
+    const input = element("input", {
+      type: "range",
+      id: `axis-${axis.name}`,
+      min: String(low),
+      max: String(high),
+      step: String((high - low) / 1000),
+      "aria-label": label,
+      title: label,
+    });
+    input.addEventListener("input", () => this.actions.coordinate(number, input.valueAsNumber));
+    this.sliders.push({ axis: number, input });
+    this.footer.append(input);
+  }
+
+  show(s: Settings, point: number[], width: number): void {
     for (const update of this.inputs.values()) update(s);
-    const clamped = Math.min(Math.max(parameter, 0), 1);
-    if (document.activeElement !== this.parameter || this.parameter.valueAsNumber !== clamped) {
-      this.parameter.valueAsNumber = clamped;
-    }
+    for (const { axis, input } of this.sliders) input.valueAsNumber = point[axis];
     const comparing = s.compare !== "off";
     this.divider.hidden = !comparing;
     this.labels.hidden = !comparing;

@@ -33,6 +33,15 @@ export interface Sample {
   still: string | null;
 }
 
+/// One dimension of the parameter space; samples are at the grid of all axes' values, the last axis running fastest.
+export interface Axis {
+  name: string;
+  values: number[];
+  low: number;
+  high: number;
+  period: number | null;
+}
+
 export interface MeshArray {
   type: "uint16" | "int16" | "int32" | "float16";
   components: number;
@@ -51,7 +60,10 @@ export interface Manifest {
     filter: "nearest" | "bilinear" | "trilinear" | "anisotropic";
     maxTaps: number;
   };
+  axes: Axis[];
+  motion: { to: Vec3; turn: number; pivot: Vec3 } | null;
   camera: {
+    kind: "arc" | "dome" | "fixed";
     target: Vec3;
     radius: number;
     height: number;
@@ -115,6 +127,31 @@ function checkProxy(proxy: ProxyShape, where: string): void {
   if (!valid) damaged(`the geometry of ${where} is not one that this page knows`);
 }
 
+function checkAxes(data: Manifest): void {
+  const valid =
+    Array.isArray(data.axes) &&
+    data.axes.every(
+      (axis) =>
+        typeof axis.name === "string" &&
+        Array.isArray(axis.values) &&
+        axis.values.length >= 1 &&
+        axis.values.every((v, i) => Number.isFinite(v) && (i === 0 || v > axis.values[i - 1])) &&
+        Number.isFinite(axis.low) &&
+        Number.isFinite(axis.high) &&
+        (axis.period === null || axis.period > 0),
+    );
+  if (!valid) damaged("its axes are not rising numbers");
+  if (data.axes.filter((axis) => axis.values.length > 1).length > 3) {
+    throw new UserError(
+      "version",
+      "This PEM has more than three dimensions; this page blends at most three.",
+    );
+  }
+  if (data.axes.reduce((n, axis) => n * axis.values.length, 1) !== data.samples.length) {
+    damaged("it has another number of samples than its axes say");
+  }
+}
+
 /// Parses and checks a manifest; throws UserError.
 export function parseManifest(text: string): Manifest {
   let data: Manifest & { format?: string; version?: number };
@@ -132,6 +169,7 @@ export function parseManifest(text: string): Manifest {
   }
   if (!Array.isArray(data.parts) || data.parts.length < 1) damaged("it has no parts");
   if (!Array.isArray(data.samples) || data.samples.length < 1) damaged("it has no samples");
+  checkAxes(data);
   for (const part of data.parts) {
     if (!Array.isArray(part.shells) || part.shells.length < 1) damaged(`part ${part.name} has no shells`);
     for (const shell of part.shells) {
@@ -142,6 +180,7 @@ export function parseManifest(text: string): Manifest {
   for (const sample of data.samples) {
     const fits =
       Array.isArray(sample.parameter) &&
+      sample.parameter.length === data.axes.length &&
       sample.parameter.every(Number.isFinite) &&
       Array.isArray(sample.maps) &&
       sample.maps.length === data.parts.length &&

@@ -5,9 +5,10 @@ import { Decoder, sameColours } from "./decoder";
 import { UserError } from "./errors";
 import { type Files, textOf } from "./files";
 import { type FrameState, Renderer } from "./gl/renderer";
-import { type Manifest, parseManifest, type Vec3 } from "./manifest";
+import { type Axis, type Manifest, parseManifest, type Vec3 } from "./manifest";
 import { cross, normalize, placeCamera, scale, subtract, type View } from "./math";
 import { decodeMesh, type Mesh } from "./mesh";
+import { type Blend, neighbours, nodeCount } from "./space";
 import type { Settings } from "./state";
 
 export const BUDGET_BYTES = 96e6;
@@ -31,6 +32,8 @@ export class Scene {
   private stillWanted = -1;
   private readonly frame: FrameState;
   private hasStatic = false;
+  private readonly here: number[];
+  private readonly nearest: Blend;
 
   private constructor(
     private gl: WebGL2RenderingContext,
@@ -44,6 +47,9 @@ export class Scene {
     this.exact = exact;
     this.renderer = new Renderer(gl, manifest, mesh, budget);
     this.cache = this.makeCache();
+    this.here = manifest.axes.map((axis) => axis.low);
+    const nodes = nodeCount(manifest.axes);
+    this.nearest = { indices: Array(nodes).fill(0), weights: Array(nodes).fill(0) };
     const { runTime } = manifest;
     this.frame = {
       width: 1,
@@ -63,6 +69,8 @@ export class Scene {
       divider: 0,
       slots: this.cache.slotsOfBlend,
       weights: this.cache.blend.weights,
+      turn: 0,
+      offset: [0, 0, 0],
       pem: 0,
       shellsOn: [],
       fresnelOn: true,
@@ -120,34 +128,44 @@ export class Scene {
     return [x + flat * Math.sin(azimuth), y + s.distance * Math.sin(elevation), z + flat * Math.cos(azimuth)];
   }
 
-  /// Parameter of the arc that belongs to a direction of view, not limited to the arc.
-  parameterOf(azimuth: number): number {
+  /// Coordinate of an axis that settings stand for; it may lie beyond the axis where the camera does.
+  coordinate(s: Settings, axis: Axis): number {
     const { startDegrees, degrees } = this.manifest.camera;
-    if (degrees === 0) return 0;
-    const middle = startDegrees + 0.5 * degrees;
-    const turned = ((((azimuth - middle + 180) % 360) + 360) % 360) - 180;
-    return (turned + 0.5 * degrees) / degrees;
+    if (axis.name === "elevation") return s.elevation;
+    if (axis.name === "azimuth") return near(s.azimuth, 0.5 * (axis.low + axis.high));
+    if (axis.name === "arc") {
+      if (degrees === 0) return 0;
+      const middle = startDegrees + 0.5 * degrees;
+      return (near(s.azimuth, middle) - startDegrees) / degrees;
+    }
+    return s.place[axis.name] ?? axis.low;
   }
 
-  azimuthOf(parameter: number): number {
+  /// What has to change in the settings for an axis to have a coordinate.
+  at(s: Settings, axis: Axis, value: number): Partial<Settings> {
     const { startDegrees, degrees } = this.manifest.camera;
-    return startDegrees + parameter * degrees;
+    if (axis.name === "elevation") return { elevation: value };
+    if (axis.name === "azimuth") return { azimuth: value };
+    if (axis.name === "arc") return { azimuth: startDegrees + value * degrees };
+    return { place: { ...s.place, [axis.name]: value } };
   }
 
-  /// Sets what is drawn and starts to fetch what is missing for it.
-  prepare(s: Settings, speed: number): void {
-    this.cache.update(this.parameterOf(s.azimuth), speed, !s.blended);
+  point(s: Settings): number[] {
+    const { axes } = this.manifest;
+    for (let a = 0; a < axes.length; ++a) this.here[a] = this.coordinate(s, axes[a]);
+    return this.here;
+  }
+
+  /// Sets what is drawn and starts to fetch what is missing for it. `velocity` has a sign per axis.
+  prepare(s: Settings, velocity: number[]): void {
+    this.cache.update(this.point(s), velocity, !s.blended);
     if (s.compare === "raytraced") this.wantStill(this.nearestSample(s));
   }
 
   nearestSample(s: Settings): number {
-    const t = this.parameterOf(s.azimuth);
-    let best = 0;
-    this.manifest.samples.forEach((sample, i) => {
-      const d = Math.abs(sample.parameter[0] - t);
-      if (d < Math.abs(this.manifest.samples[best].parameter[0] - t)) best = i;
-    });
-    return best;
+    const { axes } = this.manifest;
+    neighbours(axes, this.point(s), true, this.nearest);
+    return this.nearest.indices[this.nearest.weights.indexOf(Math.max(...this.nearest.weights))];
   }
 
   draw(s: Settings, width: number, height: number): void {
@@ -179,7 +197,7 @@ export class Scene {
       target = [...target];
     }
     const { low, high } = mesh.bounds;
-    const radius = Math.hypot(...subtract(high, low));
+    const radius = Math.hypot(...subtract(high, low)) + Math.hypot(...(this.manifest.motion?.to ?? [0]));
     const near = Math.max(s.distance - 2 * radius, 0.01 * s.distance);
     placeCamera(frame.view as View, eye, target, fov, width, height, near, s.distance + 2 * radius);
     frame.width = width;
@@ -191,6 +209,12 @@ export class Scene {
     const still = this.stillShown >= 0 && this.stillShown === this.stillWanted;
     frame.right = s.compare === "static" ? "static" : s.compare === "raytraced" && still ? "still" : "pem";
     frame.divider = s.compare === "off" ? width : s.divider * width;
+    const { motion } = this.manifest;
+    if (motion) {
+      const t = s.place.motion ?? 0;
+      frame.turn = (t * motion.turn * Math.PI) / 180;
+      for (let i = 0; i < 3; ++i) frame.offset[i] = t * motion.to[i];
+    }
     frame.pem = this.cache.share;
     frame.shellsOn = s.shells;
     frame.fresnelOn = s.fresnel;
@@ -206,7 +230,8 @@ export class Scene {
 
   private makeCache(): SampleCache {
     return new SampleCache(
-      this.manifest.samples.map((sample) => sample.parameter[0]),
+      this.manifest.axes,
+      this.manifest.samples.map((sample) => sample.parameter),
       this.renderer.pool.capacity,
       (sample, slot) => this.loadSample(sample, slot),
       () => this.events.changed(),
@@ -286,6 +311,11 @@ export class Scene {
         (failure) => this.events.failed(failure),
       );
   }
+}
+
+/// The angle in degrees, turned by whole turns, that is nearest to another one.
+function near(angle: number, middle: number): number {
+  return angle - 360 * Math.round((angle - middle) / 360);
 }
 
 const CENTRE: [number, number][] = [[0.5, 0.5]];

@@ -9,6 +9,8 @@ export interface Settings {
   azimuth: number;
   elevation: number;
   distance: number;
+  /// Coordinates on the axes that do not move the camera, by name.
+  place: { [axis: string]: number };
   compare: Compare;
   /// Where the divider is, 0 left to 1 right.
   divider: number;
@@ -31,6 +33,8 @@ const NUMBERS = { az: "azimuth", el: "elevation", d: "distance", div: "divider",
 export function toLink(s: Settings): string {
   const link = new URLSearchParams();
   for (const [key, name] of Object.entries(NUMBERS)) link.set(key, String(Number(s[name].toFixed(4))));
+  for (const [axis, value] of Object.entries(s.place))
+    link.set(`at-${axis}`, String(Number(value.toFixed(4))));
   if (s.compare !== "off") link.set("compare", s.compare);
   if (!s.blended) link.set("nearest", "1");
   if (s.lookups !== 4) link.set("lookups", String(s.lookups));
@@ -47,10 +51,14 @@ export function toLink(s: Settings): string {
 /// Takes over what a link says; what it does not say or says wrongly stays.
 export function fromLink(text: string, s: Settings): Settings {
   const link = new URLSearchParams(text.replace(/^#/, ""));
-  const result = { ...s, shells: [...s.shells] };
+  const result = { ...s, shells: [...s.shells], place: { ...s.place } };
   for (const [key, name] of Object.entries(NUMBERS)) {
     const value = Number.parseFloat(link.get(key) ?? "");
     if (Number.isFinite(value)) result[name] = value;
+  }
+  for (const axis of Object.keys(result.place)) {
+    const value = Number.parseFloat(link.get(`at-${axis}`) ?? "");
+    if (Number.isFinite(value)) result.place[axis] = value;
   }
   result.elevation = clamp(result.elevation, -89, 89);
   result.divider = clamp(result.divider, 0, 1);

@@ -30,6 +30,11 @@ _HEAD = """<!doctype html>
 _NO_SCRIPT = "<noscript>This page needs JavaScript to draw.</noscript>\n"
 
 
+def is_built() -> bool:
+    """Whether the page has been built."""
+    return (PAGE_FOLDER / SCRIPT_NAME).is_file()
+
+
 def built_file(name: str) -> str:
     """Text of a built file of the page.
 

@@ -106,6 +106,9 @@ def byte_range(header: str, size: int) -> tuple[int, int] | None:
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
+    # Head and body in one packet: apart, the second waits for the answer to the first.
+    wbufsize = 65536
+    disable_nagle_algorithm = True
     content: ClassVar[Content]
 
     def do_GET(self) -> None:

@@ -5,13 +5,11 @@ import { UserError } from "../errors";
 import type { Manifest, ProxyShape } from "../manifest";
 import type { View } from "../math";
 import type { Mesh } from "../mesh";
+import { nodeCount } from "../space";
 import { MapPool } from "./map_pool";
 import { type Counters, Program } from "./program";
 import * as shaders from "./shaders";
 import { Targets } from "./targets";
-
-/// How many samples of the parameter are blended: those on both sides.
-export const NODES = 2;
 
 export type Content = "pem" | "static" | "still";
 
@@ -30,6 +28,9 @@ export interface FrameState {
   /// Slots of the blended samples in the pool, and their weights.
   slots: number[];
   weights: number[];
+  /// Turn of the object in radians, and how far it has moved.
+  turn: number;
+  offset: [number, number, number];
   /// Share of the PEM, the rest is the static map; 0 while no sample is there.
   pem: number;
   shellsOn: boolean[];
@@ -44,6 +45,8 @@ export interface FrameState {
 
 const FRESNEL: { [name: string]: number } = { constant: 0, schlick: 1, dielectric: 2, conductor: 3 };
 const SHAPES: { [name: string]: number } = { infinite: 0, box: 1, ellipsoid: 2, hemisphere: 3 };
+
+const ORIGIN = [0, 0, 0];
 
 interface PartUniforms {
   shape: Int32Array;
@@ -73,7 +76,8 @@ export class Renderer {
   private readonly empty: WebGLVertexArrayObject | null;
   private readonly parts: PartUniforms[];
   private readonly staticUniforms: PartUniforms;
-  private readonly weights = new Float32Array(NODES);
+  private readonly nodes: number;
+  private readonly weights: Float32Array;
   private readonly flat: boolean;
   private stillTexture: WebGLTexture | null = null;
 
@@ -89,7 +93,9 @@ export class Renderer {
         "This graphics card cannot draw into half-float images, which the page needs.",
       );
     }
-    this.pool = new MapPool(gl, manifest, budget, NODES, this.counters);
+    this.nodes = nodeCount(manifest.axes);
+    this.weights = new Float32Array(this.nodes);
+    this.pool = new MapPool(gl, manifest, budget, this.nodes, this.counters);
     this.targets = new Targets(gl, this.counters);
     for (const part of manifest.parts) this.meshProgram(part.shells.length);
     this.background = new Program(gl, shaders.FULL_VERTEX, shaders.BACKGROUND_FRAGMENT, this.counters);
@@ -99,7 +105,7 @@ export class Renderer {
     this.empty = gl.createVertexArray();
     this.vertices = this.uploadMesh(mesh);
     this.flat = mesh.normals === null;
-    this.staticUniforms = partUniforms([], manifest.static.proxy, [manifest.static.size], 0, 0);
+    this.staticUniforms = partUniforms([], manifest.static.proxy, [manifest.static.size], 0, 0, 1);
     let firstMap = 0;
     let firstAlpha = 0;
     this.parts = manifest.parts.map((part) => {
@@ -109,6 +115,7 @@ export class Renderer {
         [...part.shells.map((s) => s.size), manifest.static.size],
         firstMap,
         firstAlpha,
+        this.nodes,
       );
       firstMap += part.shells.length;
       firstAlpha += part.shells.filter((s) => !s.opaque).length;
@@ -119,7 +126,12 @@ export class Renderer {
   private meshProgram(shells: number): Program {
     let program = this.meshPrograms.get(shells);
     if (!program) {
-      program = new Program(this.gl, shaders.MESH_VERTEX, shaders.meshFragment(shells, NODES), this.counters);
+      program = new Program(
+        this.gl,
+        shaders.MESH_VERTEX,
+        shaders.meshFragment(shells, this.nodes),
+        this.counters,
+      );
       this.meshPrograms.set(shells, program);
     }
     return program;
@@ -339,6 +351,9 @@ export class Renderer {
     const { low, high } = manifest.mesh.bounds;
     gl.uniform3fv(program.at("uLow"), low);
     gl.uniform3f(program.at("uExtent"), high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    gl.uniform2f(program.at("uTurn"), Math.cos(frame.turn), Math.sin(frame.turn));
+    gl.uniform3fv(program.at("uPivot"), manifest.motion?.pivot ?? ORIGIN);
+    gl.uniform3fv(program.at("uOffset"), frame.offset);
     gl.uniform3fv(program.at("uEye"), view.eye);
     gl.uniform3fv(program.at("uForward"), view.forward);
     gl.uniform3fv(program.at("uRight"), view.right);
@@ -354,7 +369,7 @@ export class Renderer {
     let alpha = 0;
     for (let s = 0; s < shells.length; ++s) {
       part.shellOn[s] = frame.shellsOn[s] === false ? 0 : 1;
-      for (let n = 0; n < NODES; ++n) {
+      for (let n = 0; n < this.nodes; ++n) {
         const at = n * shells.length + s;
         part.radianceLayer[at] = pool.radianceLayer(frame.slots[n], part.firstMap + s);
         part.alphaLayer[at] = shells[s].opaque
@@ -363,7 +378,7 @@ export class Renderer {
       }
       if (!shells[s].opaque) ++alpha;
     }
-    for (let n = 0; n < NODES; ++n) this.weights[n] = frame.weights[n];
+    for (let n = 0; n < this.nodes; ++n) this.weights[n] = frame.weights[n];
     gl.uniform1fv(program.at("uShellOn"), part.shellOn);
     gl.uniform1fv(program.at("uRadianceLayer"), part.radianceLayer);
     gl.uniform1fv(program.at("uAlphaLayer"), part.alphaLayer);
@@ -401,6 +416,7 @@ function partUniforms(
   sizes: number[],
   firstMap: number,
   firstAlpha: number,
+  nodes: number,
 ): PartUniforms {
   const all = [...proxies, staticProxy];
   const uniforms: PartUniforms = {
@@ -411,8 +427,8 @@ function partUniforms(
     origin: new Float32Array(3 * all.length),
     size: Float32Array.from(sizes),
     shellOn: new Float32Array(proxies.length).fill(1),
-    radianceLayer: new Float32Array(proxies.length * NODES),
-    alphaLayer: new Float32Array(proxies.length * NODES),
+    radianceLayer: new Float32Array(proxies.length * nodes),
+    alphaLayer: new Float32Array(proxies.length * nodes),
     firstMap,
     firstAlpha,
   };

@@ -16,6 +16,9 @@ uniform mat4 uClipFromWorld;
 uniform vec2 uShift;  // of the image, in clip space
 uniform vec3 uLow;
 uniform vec3 uExtent;
+uniform vec2 uTurn;  // cosine and sine of the object's turn about the vertical through uPivot
+uniform vec3 uPivot;
+uniform vec3 uOffset;
 out vec3 vPosition;
 out vec3 vNormal;
 out vec3 vDiffuse;
@@ -26,9 +29,13 @@ vec3 fromOctahedron(vec2 e) {
   return normalize(n);
 }
 
+vec3 turned(vec3 v) {
+  return vec3(uTurn.x * v.x + uTurn.y * v.z, v.y, uTurn.x * v.z - uTurn.y * v.x);
+}
+
 void main() {
-  vPosition = uLow + aPosition * uExtent;
-  vNormal = fromOctahedron(aNormal);
+  vPosition = turned(uLow + aPosition * uExtent - uPivot) + uPivot + uOffset;
+  vNormal = turned(fromOctahedron(aNormal));
   vDiffuse = aDiffuse;
   gl_Position = uClipFromWorld * vec4(vPosition, 1.0);
   gl_Position.xy += uShift * gl_Position.w;

@@ -59,12 +59,12 @@ async function compare(name: string): Promise<number[]> {
         if (!scene) throw new Error("no scene");
         const s = {
           ...settings,
-          azimuth: scene.azimuthOf(t),
+          ...scene.at(settings, scene.manifest.axes[0], t),
           elevation,
           distance: d,
           background: "plain" as const,
         };
-        scene.prepare(s, 0);
+        scene.prepare(s, [0]);
         return Array.from(scene.readLinear(s, w, h));
       },
       [width, height, distance, picture.parameter, picture.elevation],

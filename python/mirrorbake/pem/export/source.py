@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.opened import OpenedPem
+    from mirrorbake.scene.parameters import ParameterSpace
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,11 @@ class ExportSource:
     """A PEM as the exporters see it."""
 
     parts: tuple[Part, ...]
-    parameters: tuple[float, ...]
-    """Where on the arc each sample is, 0 to 1."""
+    space: ParameterSpace
+    """At whose nodes the samples are."""
+    motion: dict[str, Any] | None
+    """How the object moves along the axis `motion`: `to` (metres) and `turn` (degrees about the vertical in
+    `pivot`) at 1; None if it stays."""
     pyramid: Callable[[int, int, int], FloatArray]
     """`pyramid(sample, part, shell)`: all levels of a map, (texels, 3) or, not opaque, (texels, 4)."""
     still: Callable[[int], FloatArray]
@@ -95,7 +99,8 @@ def export_source(pem: OpenedPem) -> ExportSource:
 
     return ExportSource(
         parts=parts,
-        parameters=tuple(header.parameters),
+        space=header.space,
+        motion=_motion(header.source.config),
         pyramid=pyramid,
         still=lambda sample: store.read_images(sample).beauty,
         mesh=ReflectorMesh(
@@ -130,17 +135,28 @@ def export_source(pem: OpenedPem) -> ExportSource:
 
 
 def _camera(pem: OpenedPem) -> dict[str, Any]:
-    arc = pem.stage.built.arc
+    cameras = pem.stage.built.cameras
     return {
-        "kind": "arc",
-        "target": list(arc.centre),
-        "radius": arc.radius,
-        "height": arc.height,
-        "startDegrees": arc.start,
-        "degrees": arc.degrees,
-        "verticalFovDegrees": arc.fov,
-        "aspect": arc.size[0] / arc.size[1],
-        "pixels": arc.size[1],
+        "kind": cameras.kind,
+        "target": list(cameras.centre),
+        "radius": cameras.radius,
+        "height": cameras.height,
+        "startDegrees": cameras.start,
+        "degrees": cameras.degrees,
+        "verticalFovDegrees": cameras.fov,
+        "aspect": cameras.size[0] / cameras.size[1],
+        "pixels": cameras.size[1],
+    }
+
+
+def _motion(config: dict[str, Any]) -> dict[str, Any] | None:
+    motion = config.get("motion")
+    if motion is None:
+        return None
+    return {
+        "to": list(motion["to"]),
+        "turn": motion["turn"],
+        "pivot": list(config["reflector"]["position"]),
     }
 
 

@@ -61,7 +61,7 @@ class WebPem:
         self._options = options or WebOptions()
         self._code = _code_of(source)
         self._makers: dict[str, Callable[[], bytes]] = {}
-        self._first = nearest_to_middle(source.parameters)
+        self._first = len(source.space) // 2
         self._collect()
 
     @property
@@ -93,7 +93,7 @@ class WebPem:
         self._makers["mesh.bin.gz"] = lambda: mesh
         self._add("static/capture", lambda: to_atlas(code.encode(source.static), source.static_size))
         # The sample that is shown first, then outwards from it.
-        for i in sorted(range(len(source.parameters)), key=lambda i: abs(i - self._first)):
+        for i in sorted(range(len(source.space)), key=lambda i: abs(i - self._first)):
             for p, part in enumerate(source.parts):
                 for s, shell in enumerate(part.shells):
                     name = _map_name(i, p, s)
@@ -101,7 +101,7 @@ class WebPem:
                     if not shell.opaque:
                         self._add(name + ".alpha", partial(self._alpha, i, p, s))
         if options.stills:
-            for i in range(len(source.parameters)):
+            for i in range(len(source.space)):
                 self._add(_still_name(i), partial(self._still, i))
 
     def _add(self, name: str, pixels: Callable[[], NDArray[np.uint8]]) -> None:
@@ -134,7 +134,9 @@ class WebPem:
             "title": source.title,
             "notes": list(source.notes),
             "runTime": source.run_time,
+            "axes": source.space.to_attributes(),
             "camera": source.camera,
+            "motion": source.motion,
             "material": source.material,
             "radiance": {"low": self._code.low, "high": self._code.high, "epsilon": self._code.epsilon},
             "images": {
@@ -161,7 +163,7 @@ class WebPem:
                 for part in source.parts
             ],
             "static": {"image": "static/capture", "size": source.static_size, "proxy": source.static_proxy},
-            "samples": [self._sample(i) for i in range(len(source.parameters))],
+            "samples": [self._sample(i) for i in range(len(source.space))],
             "first": self._first,
         }
 
@@ -175,7 +177,7 @@ class WebPem:
             for p, part in enumerate(self._source.parts)
         ]
         still = _still_name(i) if self._options.stills else None
-        return {"parameter": [self._source.parameters[i]], "maps": maps, "still": still}
+        return {"parameter": list(self._source.space.sample(i)), "maps": maps, "still": still}
 
 
 def _map_name(sample: int, part: int, shell: int) -> str:
@@ -184,12 +186,6 @@ def _map_name(sample: int, part: int, shell: int) -> str:
 
 def _still_name(sample: int) -> str:
     return f"samples/{sample:05d}/still"
-
-
-def nearest_to_middle(parameters: tuple[float, ...]) -> int:
-    """Return the sample that the page shows first: the one in the middle of the arc."""
-    middle = 0.5 * (parameters[0] + parameters[-1])
-    return min(range(len(parameters)), key=lambda i: abs(parameters[i] - middle))
 
 
 def display_codes(radiance: FloatArray) -> NDArray[np.uint8]:
@@ -227,7 +223,7 @@ def neutral_tone_map(radiance: FloatArray) -> FloatArray:
 
 def _code_of(source: ExportSource) -> RadianceCode:
     """Return a code that holds the radiance of the maps, of at most `PROBED_SAMPLES` samples."""
-    count = len(source.parameters)
+    count = len(source.space)
     probed = np.unique(np.linspace(0, count - 1, min(count, PROBED_SAMPLES)).round().astype(int))
     bright, largest = [], float(source.static.max())
     for i in probed:

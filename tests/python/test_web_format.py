@@ -1,0 +1,196 @@
+"""The files of a PEM on the web."""
+
+import gzip
+import json
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mirrorbake.pem.export.images import ImageFormat, probe_image
+from mirrorbake.pem.export.mesh_file import ReflectorMesh, octahedral, write_mesh
+from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_atlas, level_place, to_atlas
+from mirrorbake.pem.export.web import WebOptions, WebPem
+from viewer_cases import CasePem, Scene, case_scene, case_source, cases
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return case_scene(cases()[0])
+
+
+def test_codes_of_radiance_are_off_by_half_a_step_of_their_logarithm() -> None:
+    code = RadianceCode.for_range(bright=2.0, largest=40.0)
+    radiance = np.linspace(0.0, 40.0, 100_001, dtype=np.float32)
+    step = (code.high - code.low) / 255.0
+    error = np.log2(code.decode(code.encode(radiance)) + code.epsilon) - np.log2(radiance + code.epsilon)
+    assert np.abs(error).max() < 0.5 * step + 1e-5
+
+
+def test_black_is_code_0_and_comes_back_as_black() -> None:
+    code = RadianceCode.for_range(bright=2.0, largest=40.0)
+    assert code.encode(np.zeros(3, np.float32)).tolist() == [0, 0, 0]
+    assert code.table()[0] == 0.0
+
+
+def test_radiance_beyond_the_range_is_clamped_to_its_ends() -> None:
+    code = RadianceCode.for_range(bright=2.0, largest=40.0)
+    assert code.encode(np.array([-1.0, 1e9], np.float32)).tolist() == [0, 255]
+
+
+@pytest.mark.parametrize("bright", [0.0, 1e-6, 1.0])
+def test_maps_that_are_black_have_a_code(bright: float) -> None:
+    code = RadianceCode.for_range(bright, 0.0)
+    assert code.high > code.low
+    assert np.isfinite(code.table()).all()
+
+
+@pytest.mark.parametrize("size", [1, 2, 8, 64])
+def test_an_atlas_holds_every_texel_of_every_level_once(size: int) -> None:
+    texels = sum(6 * (size >> level) ** 2 for level in range(size.bit_length()))
+    pyramid = np.random.default_rng(1).integers(0, 256, (texels, 3), np.uint8)
+    atlas = to_atlas(pyramid, size)
+    assert atlas.shape == (*atlas_shape(size), 3)
+    assert np.array_equal(from_atlas(atlas, size), pyramid)
+
+
+def test_levels_of_an_atlas_do_not_overlap() -> None:
+    size = 32
+    taken = np.zeros(atlas_shape(size), int)
+    for level in range(size.bit_length()):
+        row, column = level_place(size, level)
+        taken[row : row + 2 * (size >> level), column : column + 3 * (size >> level)] += 1
+    assert taken.max() == 1
+
+
+def test_exact_images_come_back_bit_by_bit() -> None:
+    image = np.random.default_rng(2).integers(0, 256, (24, 40, 3), np.uint8)
+    form = ImageFormat(exact=True)
+    assert np.array_equal(form.decode(form.encode(image)), image)
+    assert np.array_equal(form.decode(form.encode(image[..., 0]))[..., 1], image[..., 0])
+
+
+def test_avif_images_are_near_and_smaller_with_less_quality() -> None:
+    y, x = np.mgrid[0:64, 0:96]
+    image = np.stack([2 * x, 3 * y, 255 - x - y], axis=-1).astype(np.uint8)
+    good, poor = ImageFormat(exact=False), ImageFormat(exact=False, quality=30)
+    error = good.decode(good.encode(image)).astype(float) - image
+    assert np.sqrt(np.mean(error**2)) < 1.5
+    assert len(poor.encode(image)) < len(good.encode(image))
+    # Grey images obey the quality as well.
+    noise = np.random.default_rng(3).integers(0, 256, (64, 64), np.uint8)
+    assert len(poor.encode(noise)) < 0.5 * len(good.encode(noise))
+
+
+def test_the_probe_tells_a_limited_range_and_swapped_channels_apart() -> None:
+    image = probe_image().astype(float)
+    limited = 16.0 + image * (219.0 / 255.0)
+    assert np.abs(limited - image).max() > 8.0
+    assert np.abs(image[..., ::-1] - image).max() > 8.0
+
+
+def unfold(fractions: NDArray[np.int16]) -> NDArray[np.float64]:
+    xy = fractions / 32767.0
+    z = 1.0 - np.abs(xy).sum(axis=1)
+    folded = (1.0 - np.abs(xy[:, ::-1])) * np.where(xy >= 0.0, 1.0, -1.0)
+    n = np.column_stack([np.where(z[:, None] >= 0.0, xy, folded), z])
+    unit: NDArray[np.float64] = n / np.linalg.norm(n, axis=1, keepdims=True)
+    return unit
+
+
+def test_normals_on_the_octahedron_are_within_1e_4_radians() -> None:
+    n = np.random.default_rng(4).normal(size=(20_000, 3))
+    n = np.concatenate([n, np.eye(3), -np.eye(3)])
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    error = np.linalg.norm(unfold(octahedral(n.astype(np.float32))) - n, axis=1)
+    assert error.max() < 1e-4
+
+
+def read_array(payload: bytes, array: dict[str, int | str]) -> NDArray[np.generic]:
+    """What the page's `gather` does."""
+    kind, count, components = np.dtype(str(array["type"])), int(array["count"]), int(array["components"])
+    start = int(array["offset"])
+    planes = np.frombuffer(payload, np.uint8, count * components * kind.itemsize, start)
+    ordered = planes.reshape(components, kind.itemsize, count).transpose(2, 0, 1)
+    return np.ascontiguousarray(ordered).view(kind)[..., 0]
+
+
+def test_a_mesh_comes_back_sorted_by_part_and_shells(scene: Scene) -> None:
+    mesh = scene.mesh
+    data, layout = write_mesh(mesh, 2)
+    payload = gzip.decompress(data)
+    assert len(payload) == layout["bytes"]
+    arrays = layout["arrays"]
+    triangles = np.cumsum(read_array(payload, arrays["indices"])[:, 0].astype(np.int64)).reshape(-1, 3)
+    low, high = np.array(layout["bounds"]["low"]), np.array(layout["bounds"]["high"])
+    positions = low + read_array(payload, arrays["positions"]) / 65535.0 * (high - low)
+    start = 0
+    for part, described in enumerate(layout["parts"]):
+        mine = mesh.parts == part
+        assert described == {
+            "start": start,
+            "stacked": np.count_nonzero(mine & mesh.whole_stack),
+            "count": np.count_nonzero(mine),
+        }
+        start += described["count"]
+        expected = np.concatenate(
+            [mesh.triangles[mine & mesh.whole_stack], mesh.triangles[mine & ~mesh.whole_stack]]
+        )
+        seen = triangles[described["start"] : described["start"] + described["count"]]
+        error = positions[seen] - mesh.positions[expected]
+        # Half a step of 16 bits, and the rounding of float32.
+        assert (np.abs(error) <= 0.51 / 65535.0 * (high - low)).all()
+
+
+def test_vertices_that_no_triangle_uses_are_left_out() -> None:
+    mesh = ReflectorMesh(
+        positions=np.array([[9, 9, 9], [0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32),
+        normals=np.zeros((0, 3), np.float32),
+        triangles=np.array([[1, 2, 3]], np.uint32),
+        parts=np.zeros(1, np.uint16),
+        whole_stack=np.ones(1, np.bool_),
+        diffuse=None,
+    )
+    _, layout = write_mesh(mesh, 1)
+    assert layout["arrays"]["positions"]["count"] == 3
+    assert layout["bounds"]["high"] == [1.0, 1.0, 1.0]
+    assert "normals" not in layout["arrays"]
+
+
+def test_the_manifest_names_every_file_and_no_other(scene: Scene) -> None:
+    web = WebPem(case_source(cases()[0], scene, CasePem()), WebOptions())
+    manifest = json.loads(web.read("manifest.json"))
+    suffix = manifest["images"]["suffix"]
+    images = [manifest["static"]["image"]]
+    for sample in manifest["samples"]:
+        images.append(sample["still"])
+        for part in sample["maps"]:
+            for files in part:
+                images += [name for name in files.values() if name is not None]
+    expected = {
+        "manifest.json",
+        manifest["mesh"]["file"],
+        manifest["probe"]["file"],
+        manifest["poster"]["file"],
+    }
+    expected |= {name + suffix for name in images} | {f"exact/{name}.webp" for name in images}
+    assert set(web.names) == expected
+    assert web.names[0] == "manifest.json"
+    first = manifest["samples"][manifest["first"]]["maps"][0][0]["radiance"]
+    assert web.names.index(first + suffix) < min(
+        web.names.index(sample["maps"][0][0]["radiance"] + suffix)
+        for i, sample in enumerate(manifest["samples"])
+        if i != manifest["first"]
+    )
+
+
+def test_an_exact_image_of_a_map_holds_its_codes(scene: Scene) -> None:
+    pem = CasePem()
+    web = WebPem(case_source(cases()[0], scene, pem), WebOptions(ImageFormat(exact=True)))
+    code = RadianceCode(**json.loads(web.read("manifest.json"))["radiance"])
+    pyramid = pem.pyramid(1, 0, 0)
+    form = ImageFormat(exact=True)
+    atlas = form.decode(web.read("samples/00001/0.0.webp"))
+    assert np.array_equal(from_atlas(atlas, 32), code.encode(pyramid[:, :3]))
+    alpha = form.decode(web.read("samples/00001/0.0.alpha.webp"))
+    assert np.array_equal(from_atlas(alpha, 32)[:, 0], np.rint(pyramid[:, 3] * 255.0))

@@ -106,13 +106,14 @@ def test_normals_on_the_octahedron_are_within_1e_4_radians() -> None:
     assert error.max() < 1e-4
 
 
-def read_array(payload: bytes, array: dict[str, int | str]) -> NDArray[np.generic]:
+def read_array(payload: bytes, array: dict[str, int | str]) -> NDArray[np.float64]:
     """What the page's `gather` does."""
     kind, count, components = np.dtype(str(array["type"])), int(array["count"]), int(array["components"])
     start = int(array["offset"])
     planes = np.frombuffer(payload, np.uint8, count * components * kind.itemsize, start)
     ordered = planes.reshape(components, kind.itemsize, count).transpose(2, 0, 1)
-    return np.ascontiguousarray(ordered).view(kind)[..., 0]
+    values: NDArray[np.float64] = np.ascontiguousarray(ordered).view(kind)[..., 0].astype(np.float64)
+    return values
 
 
 def test_a_mesh_comes_back_sorted_by_part_and_shells(scene: Scene) -> None:

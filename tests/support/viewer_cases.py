@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,7 @@ from mirrorbake import _core
 from mirrorbake.pem.export.images import ImageFormat
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
 from mirrorbake.pem.export.radiance_code import RadianceCode
-from mirrorbake.pem.export.source import ExportSource, Part, Shell
+from mirrorbake.pem.export.source import ExportSource, Part, Shell, run_time_attributes
 from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.proxy import proxy_to_attributes
 from mirrorbake.scene.parameters import Axis, ParameterSpace
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
 
 MAP_SIZE = 32
-PLACES = [(0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875)]
-FOOTPRINT = 0.5
 WIDTH, HEIGHT, FOV = 320, 240, 30.0
 DISTANCE, ELEVATION = 0.6, 20.0
 PARAMETERS = (0.0, 0.5, 1.0)
@@ -50,6 +48,7 @@ class Case:
     local: _core.Proxy
     fresnel: _core.Fresnel
     coated: bool = False
+    run_time: _core.RunTimeModel = field(default_factory=lambda: _core.run_time_model("Web"))
 
 
 def cases() -> list[Case]:
@@ -80,7 +79,18 @@ def cases() -> list[Case]:
             local,
             _core.Fresnel(model=model.conductor, eta=(0.2, 0.9, 1.3), k=(3.9, 2.5, 2.2)),
         ),
-        Case("sphere", _core.Proxy.ellipsoid((0, 0.5, 0), (2.0, 2.0, 2.0), origin, straight), local, schlick),
+        Case(
+            "sphere",
+            _core.Proxy.ellipsoid((0, 0.5, 0), (2.0, 2.0, 2.0), origin, straight),
+            local,
+            schlick,
+            run_time=_core.RunTimeModel(
+                name="Trilinear",
+                places=_core.run_time_model("Web").places,
+                footprint_scale=0.5,
+                filter="trilinear",
+            ),
+        ),
         Case(
             "hemisphere",
             _core.Proxy.hemisphere((0, -0.05, 0), 2.0, origin, turned),
@@ -227,13 +237,7 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
             "aspect": WIDTH / HEIGHT,
             "pixels": HEIGHT,
         },
-        run_time={
-            "name": "Trilinear",
-            "places": [list(place) for place in PLACES],
-            "footprintScale": FOOTPRINT,
-            "filter": "trilinear",
-            "maxTaps": 1,
-        },
+        run_time=run_time_attributes(case.run_time),
         title=case.name,
         notes=(),
     )
@@ -242,7 +246,7 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
 def reference(case: Case, scene: Scene, pem: CasePem, code: RadianceCode, t: float) -> FloatArray:
     """The C++ renderer's picture at a parameter, (H, W, 4)."""
     camera = _core.Camera(_eye(t), (0.0, 0.1, 0.0), vertical_fov_degrees=FOV, width=WIDTH, height=HEIGHT)
-    samples = scene.tracer.trace_visibility(camera, 0, places=PLACES)
+    samples = scene.tracer.trace_visibility(camera, 0, places=case.run_time.places)
     place = t * (len(PARAMETERS) - 1)
     first = min(int(place), len(PARAMETERS) - 2)
     weight = np.float32(place - first)
@@ -252,15 +256,17 @@ def reference(case: Case, scene: Scene, pem: CasePem, code: RadianceCode, t: flo
         b = pem.rounded(code, first + 1, part, shell)
         return (1 - weight) * a + weight * b
 
+    layout = _core.CubePyramidLayout(MAP_SIZE)
+    stacked = scene.mesh.whole_stack.astype(np.uint8)
     parts = [
-        _core.PartMaps(
-            case.distant, blended(0, 1), case.local, blended(0, 0), scene.mesh.whole_stack.astype(np.uint8)
-        ),
-        _core.PartMaps(case.distant, blended(1, 0)),
+        [
+            _core.ShellMap(case.local, layout, blended(0, 0), stacked),
+            _core.ShellMap(case.distant, layout, blended(0, 1)),
+        ],
+        [_core.ShellMap(case.distant, layout, blended(1, 0))],
     ]
     diffuse = _core.diffuse_from_irradiance(samples, scene.mesh.triangles, scene.irradiance)
-    options = _core.LookupOptions(footprint_scale=FOOTPRINT)
-    return _core.render_reflector(samples, parts, _core.CubePyramidLayout(MAP_SIZE), diffuse, options)
+    return _core.render_reflector(samples, parts, diffuse, case.run_time)
 
 
 def write_case(case: Case, folder: Path, image_format: ImageFormat) -> None:

@@ -19,7 +19,7 @@ COMMANDS = [
     *(f"mb-fresnel {command}" for command in ("table", "plot", "metal", "report")),
     *(
         f"mirrorbake {command}"
-        for command in ("bake", "analyze", "evaluate", "report", "render", "export", "demo")
+        for command in ("bake", "analyze", "evaluate", "report", "render", "export", "view", "demo")
     ),
     *("mirrorbake study fresnel", "mirrorbake study proxy"),
 ]

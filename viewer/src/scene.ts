@@ -202,7 +202,7 @@ export class Scene {
     placeCamera(frame.view as View, eye, target, fov, width, height, near, s.distance + 2 * radius);
     frame.width = width;
     frame.height = height;
-    frame.places = s.lookups === 4 ? (runTime.places.length > 1 ? runTime.places : GRID) : CENTRE;
+    frame.places = s.lookups === 1 ? CENTRE : runTime.places.length === 4 ? runTime.places : GRID;
     const lookups = Math.max(runTime.places.length, 1);
     frame.footprint = (runTime.footprintScale * Math.sqrt(lookups)) / Math.sqrt(frame.places.length);
     frame.left = "pem";

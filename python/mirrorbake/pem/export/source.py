@@ -122,16 +122,21 @@ def export_source(pem: OpenedPem) -> ExportSource:
         static_proxy=header.static["proxy"] or header.static["infinite"],
         static_size=header.map_size,
         camera=_camera(pem),
-        run_time={
-            "name": "Trilinear",
-            "places": [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]],
-            "footprintScale": 2.0 * header.source.config["infer"]["footprint_scale"],
-            "filter": "trilinear",
-            "maxTaps": 1,
-        },
+        run_time=run_time_attributes(pem.run_time.model),
         title=_title(header.source.config),
         notes=tuple(notes),
     )
+
+
+def run_time_attributes(model: _core.RunTimeModel) -> dict[str, Any]:
+    """Return plain values of what the page needs to know of a run-time model."""
+    return {
+        "name": model.name,
+        "places": [list(place) for place in model.places],
+        "footprintScale": model.footprint_scale,
+        "filter": model.filter,
+        "maxTaps": model.max_taps,
+    }
 
 
 def _camera(pem: OpenedPem) -> dict[str, Any]:

@@ -87,12 +87,13 @@ void bind_surface_material(nb::module_& m) {
              bool specular, const Fresnel& fresnel, const TextureReference& specular_texture,
              SpecularLobe lobe, float roughness, const TextureReference& roughness_texture, float exponent,
              LayerModel layers, glm::vec3 emission, const TextureReference& emission_texture, float opacity,
-             const TextureReference& opacity_texture, std::optional<float> opacity_cutoff) {
+             const TextureReference& opacity_texture, std::optional<float> opacity_cutoff,
+             const TextureReference& normal_texture, float normal_scale, bool colors_tint_reflectance) {
             new (self)
                 Material{std::move(name),  albedo,   albedo_texture,   specular,          fresnel,
                          specular_texture, lobe,     roughness,        roughness_texture, exponent,
                          layers,           emission, emission_texture, opacity,           opacity_texture,
-                         opacity_cutoff};
+                         opacity_cutoff,   normal_texture, normal_scale,   colors_tint_reflectance};
           },
           nb::kw_only(), nb::arg("name") = "", nb::arg("albedo") = glm::vec3(0.5F),
           nb::arg("albedo_texture") = TextureReference{}, nb::arg("specular") = false,
@@ -101,7 +102,9 @@ void bind_surface_material(nb::module_& m) {
           nb::arg("roughness_texture") = TextureReference{}, nb::arg("exponent") = Material{}.exponent,
           nb::arg("layers") = LayerModel::additive, nb::arg("emission") = glm::vec3(0.0F),
           nb::arg("emission_texture") = TextureReference{}, nb::arg("opacity") = 1.0F,
-          nb::arg("opacity_texture") = TextureReference{}, nb::arg("opacity_cutoff") = nb::none())
+          nb::arg("opacity_texture") = TextureReference{}, nb::arg("opacity_cutoff") = nb::none(),
+          nb::arg("normal_texture") = TextureReference{}, nb::arg("normal_scale") = 1.0F,
+          nb::arg("colors_tint_reflectance") = false)
       .def_rw("name", &Material::name)
       .def_rw("albedo", &Material::albedo, "Lambertian reflectance per channel, in [0, 1]")
       .def_rw("albedo_texture", &Material::albedo_texture, "multiplies `albedo`")
@@ -121,7 +124,12 @@ void bind_surface_material(nb::module_& m) {
       .def_rw("opacity_texture", &Material::opacity_texture,
               "its first channel multiplies `opacity`; its texels have to be in memory")
       .def_rw("opacity_cutoff", &Material::opacity_cutoff,
-              "None, or: all is there where the opacity is at least this, nothing elsewhere");
+              "None, or: all is there where the opacity is at least this, nothing elsewhere")
+      .def_rw("normal_texture", &Material::normal_texture,
+              "bends the normal: texels (x, y, z)/2 + 1/2 along ∂p/∂u, ∂p/∂v (v up) and the normal")
+      .def_rw("normal_scale", &Material::normal_scale, "of the x and y of `normal_texture`")
+      .def_rw("colors_tint_reflectance", &Material::colors_tint_reflectance,
+              "the mesh's colours multiply `fresnel.r0`, too: of a metal");
 }
 
 }  // namespace

@@ -76,21 +76,24 @@ void bind_mesh(nb::module_& m) {
           "__init__",
           [](TriangleMesh* self, const PointArray& positions, const TriangleArray& triangles,
              const std::optional<PointArray>& normals, const std::optional<UvArray>& uvs,
-             const std::optional<PartArray>& parts) {
+             const std::optional<PartArray>& parts, const std::optional<PointArray>& colors) {
             TriangleMesh mesh;
             mesh.positions = copied<glm::vec3>(positions);
             mesh.triangles = copied<glm::uvec3>(triangles);
             if (normals) mesh.normals = copied<glm::vec3>(*normals);
             if (uvs) mesh.uvs = copied<glm::vec2>(*uvs);
             if (parts) mesh.parts = copied<std::uint16_t>(*parts);
+            if (colors) mesh.colors = copied<glm::vec3>(*colors);
             validate(mesh);
             new (self) TriangleMesh(std::move(mesh));
           },
           nb::arg("positions"), nb::arg("triangles"), nb::arg("normals") = nb::none(),
-          nb::arg("uvs") = nb::none(), nb::arg("parts") = nb::none(),
+          nb::arg("uvs") = nb::none(), nb::arg("parts") = nb::none(), nb::arg("colors") = nb::none(),
           "Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from outside, "
           "unit\n"
-          "normals (V, 3) (default: flat shading), uvs (V, 2) with v up, and the part of each triangle (T,). "
+          "normals (V, 3) (default: flat shading), uvs (V, 2) with v up, the part of each triangle (T,), and "
+          "colours\n"
+          "(V, 3) in [0, 1], linear, that multiply the material's albedo. "
           "Raises\n"
           "InvalidArgument for anything not finite, indices out of range or a mesh without area.")
       .def_prop_ro(
@@ -108,6 +111,9 @@ void bind_mesh(nb::module_& m) {
       .def_prop_ro(
           "parts", [](nb::handle self) { return scalars_view(mesh_of(self).parts, self); },
           "Part of each triangle, (T,), or (0,) if all belong to part 0.")
+      .def_prop_ro(
+          "colors", [](nb::handle self) { return vectors_view(mesh_of(self).colors, self); },
+          "Colours of the vertices, (V, 3), linear, or (0, 3) if they have none.")
       .def("__repr__", [](const TriangleMesh& mesh) {
         return "TriangleMesh(" + std::to_string(mesh.positions.size()) + " vertices, " +
                std::to_string(mesh.triangles.size()) + " triangles)";

@@ -114,6 +114,10 @@ void check_material(const Scene& scene, std::size_t index) {
   }
   check_reference(scene, where + " emission_texture", material.emission_texture);
   check_opacity(scene, where, material);
+  check_reference(scene, where + " normal_texture", material.normal_texture);
+  if (!is_finite(material.normal_scale)) {
+    throw InvalidArgument(where + " normal_scale", text_of(material.normal_scale), "a finite number");
+  }
   if (!material.specular) return;
   check_reference(scene, where + " specular_texture", material.specular_texture);
   check_reference(scene, where + " roughness_texture", material.roughness_texture);
@@ -161,6 +165,16 @@ void check_mesh(const std::string& where, const TriangleMesh& mesh, std::size_t 
     if (!is_finite(p) || std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kMaxCoordinate) {
       throw InvalidArgument(where + " vertex " + std::to_string(i), text_of(p),
                             "finite coordinates up to 1e12");
+    }
+  }
+  if (!mesh.colors.empty() && mesh.colors.size() != vertex_count) {
+    throw InvalidArgument(where + " colour count", std::to_string(mesh.colors.size()),
+                          "0 or the vertex count " + std::to_string(vertex_count));
+  }
+  for (std::size_t i = 0; i < mesh.colors.size(); ++i) {
+    if (!in_unit_interval(mesh.colors[i])) {
+      throw InvalidArgument(where + " colour " + std::to_string(i), text_of(mesh.colors[i]),
+                            "values in [0, 1]");
     }
   }
   if (!mesh.normals.empty() && mesh.normals.size() != vertex_count) {

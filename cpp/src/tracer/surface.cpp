@@ -1,6 +1,7 @@
 #include "surface.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -32,6 +33,32 @@ glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
   const glm::vec3 half = view + raised;
   const float length = glm::length(half);
   return length > 0.0F ? half / length : geometric;
+}
+
+// The shading normal bent by a texture (glTF 2.0 §3.9.3). The tangents are those of the triangle's plane, made upright to the
+// normal that is interpolated over it.
+glm::vec3 mapped_normal(const Scene& scene, const Material& material, const TriangleMesh& mesh, const Surface& s,
+                        const std::array<glm::vec3, 3>& corners) {
+  if (mesh.uvs.empty()) return s.normal;
+  const glm::uvec3 t = mesh.triangles[s.triangle];
+  const glm::vec2 du = mesh.uvs[t.y] - mesh.uvs[t.x];
+  const glm::vec2 dv = mesh.uvs[t.z] - mesh.uvs[t.x];
+  const float determinant = du.x * dv.y - du.y * dv.x;
+  if (determinant == 0.0F) return s.normal;
+  const glm::vec3 e1 = corners[1] - corners[0];
+  const glm::vec3 e2 = corners[2] - corners[0];
+  const glm::vec3 along_u = (dv.y * e1 - du.y * e2) * std::copysign(1.0F, determinant);
+  const glm::vec3 flat = along_u - glm::dot(along_u, s.normal) * s.normal;
+  const float length = glm::length(flat);
+  if (!(length > 0.0F)) return s.normal;
+  const glm::vec3 tangent = flat / length;
+  const glm::vec3 bitangent = glm::cross(s.normal, tangent) * std::copysign(1.0F, determinant);
+  const glm::vec3 texel =
+      texture_lookup(scene, material.normal_texture, uv_at(mesh, s.triangle, s.barycentric)) * 2.0F - 1.0F;
+  const glm::vec3 bent = material.normal_scale * (texel.x * tangent + texel.y * bitangent) + texel.z * s.normal;
+  const float size = glm::length(bent);
+  // One that leaves the triangle's front is a defect of the texture.
+  return size > 1e-6F && glm::dot(bent, s.geometric_normal) > 0.0F ? bent / size : s.normal;
 }
 
 }  // namespace
@@ -79,6 +106,9 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
     // A normal on the wrong side of its triangle is a defect of the mesh.
     if (length > 1e-6F && glm::dot(n, s.geometric_normal) > 0.0F) s.normal = n / length;
   }
+  if (s.material->normal_texture.texture >= 0) {
+    s.normal = mapped_normal(scene, *s.material, mesh, s, {a, b, c});
+  }
   if (!s.front) {
     s.geometric_normal = -s.geometric_normal;
     s.normal = -s.normal;
@@ -94,6 +124,9 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
   if (s.material->albedo_texture.texture >= 0 && s.albedo != glm::vec3(0.0F)) {
     s.albedo *= texture_lookup(scene, s.material->albedo_texture, uv_at(mesh, s.triangle, s.barycentric));
   }
+  const glm::vec3 color =
+      mesh.colors.empty() ? glm::vec3(1.0F) : interpolate(mesh.colors, corner, s.barycentric);
+  s.albedo *= color;
   if (s.material->specular) {
     s.normal = bend_normal(s.view, s.normal, s.geometric_normal);
     s.reflection = glm::normalize(reflect_about(s.view, s.normal));
@@ -101,6 +134,7 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
       s.reflectance_scale =
           texture_lookup(scene, s.material->specular_texture, uv_at(mesh, s.triangle, s.barycentric));
     }
+    if (s.material->colors_tint_reflectance) s.reflectance_scale *= color;
     s.fresnel = fresnel_at(s, glm::dot(s.normal, s.view));
     if (s.material->lobe == SpecularLobe::ggx) {
       s.roughness = s.material->roughness;

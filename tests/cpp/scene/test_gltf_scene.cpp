@@ -94,7 +94,7 @@ TEST_F(GltfSceneFile, HasOneObjectPerNodeAndMaterialWithUniqueNames) {
   ASSERT_EQ(scene.materials.size(), 2U);
   EXPECT_EQ(scene.materials[static_cast<std::size_t>(scene.objects[0].material)].name, "blue");
   EXPECT_EQ(scene.objects[0].mesh.triangles.size(), 4U);  // two primitives of one material
-  EXPECT_EQ(scene.objects[0].mesh.positions.size(), 8U);
+  EXPECT_EQ(scene.objects[0].mesh.positions.size(), 12U);  // without normals, facets share no vertices
   EXPECT_EQ(scene.objects[2].mesh.positions[2], glm::vec3(1, 1, 5));
   EXPECT_EQ(scene.objects[4].mesh.positions[2], glm::vec3(2, 2, 0));
 }
@@ -246,8 +246,6 @@ TEST_F(GltfSceneFile, AlphaModesDecideWhatBecomesOfAlpha) {
   expect_error(wrong, "material 0 alphaMode is 'GLASS', expected OPAQUE, MASK or BLEND");
   wrong.materials = R"([{"alphaMode":"MASK","alphaCutoff":-1}])";
   expect_error(wrong, "material 0 alphaCutoff is -1");
-  wrong.materials = R"([{"pbrMetallicRoughness":{"baseColorFactor":[1,1,1,2]}}])";
-  expect_error(wrong, "baseColorFactor's alpha");
 }
 
 TEST_F(GltfSceneFile, MetallicTexturesAreMixedIntoAlbedoAndReflectance) {
@@ -365,13 +363,13 @@ TEST_F(GltfSceneFile, CamerasAreViewpoints) {
 
 TEST_F(GltfSceneFile, UnknownExtensionsAreCountedUnlessTheyAreRequired) {
   Document document;
-  document.materials = R"([{"normalTexture":{"index":0}},{"normalTexture":{"index":0}}])";
+  document.materials = R"([{"occlusionTexture":{"index":0}},{"occlusionTexture":{"index":0}}])";
   document.primitives = R"([{"attributes":{"POSITION":0},"indices":3,"material":0},
       {"attributes":{"POSITION":0},"indices":3,"material":1}])";
   document.extra = R"("extensionsUsed":["KHR_texture_transform","KHR_materials_clearcoat"],)";
   EXPECT_THAT(messages(load(document)),
               ElementsAre("the extension KHR_materials_clearcoat is not supported x1",
-                          "normal textures are not supported x2"));
+                          "occlusion textures are not used: the ray tracer finds what is occluded x2"));
   document.extra += R"("extensionsRequired":["KHR_materials_clearcoat"],)";
   expect_error(document, "requires the extension KHR_materials_clearcoat");
 }
@@ -412,8 +410,6 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
   const std::vector<Defect> defects = {
       {"material index is 0, the file has 0", [](Document& d) { d.materials = "[]"; }},
       {"baseColorFactor is (-", material(R"({"pbrMetallicRoughness":{"baseColorFactor":[-1,0,0,1]}})")},
-      {"metallicFactor is 1.5", material(R"({"pbrMetallicRoughness":{"metallicFactor":1.5}})")},
-      {"roughnessFactor is -0.1", material(R"({"pbrMetallicRoughness":{"roughnessFactor":-0.1}})")},
       {"emission is (0, -1", material(R"({"emissiveFactor":[0,-1,0]})")},
       {"emission is (inf", material(R"({"emissiveFactor":[1e300,0,0]})")},
       {"emission is (-", material(R"({"emissiveFactor":[1,1,1],"extensions":
@@ -428,7 +424,6 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
       {"emissive texture index is 7",
        material(R"({"emissiveFactor":[1,1,1],"emissiveTexture":{"index":7}})")},
       {"base colour image index is 3", texture(R"("textures":[{"source":3}],)")},
-      {"base colour image index is -1", texture(R"("textures":[{}],)")},
       {"base colour sampler index is 5",
        texture(R"("textures":[{"source":0,"sampler":5}],"images":[{"uri":"text.png"}],)")},
       {"wrap mode is 12", texture(R"("textures":[{"source":0,"sampler":0}],"samplers":[{"wrapS":12}],
@@ -459,8 +454,8 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
       {"type is 'laser'", light("", R"({"type":"laser"})")},
       {"intensity is (-", light("", R"({"type":"point","intensity":-1})")},
       {"color is not three numbers", light("", R"({"type":"point","color":[1,1]})")},
-      {"cone angles are", light("", R"({"type":"spot","spot":{"innerConeAngle":0.7,"outerConeAngle":0.6}})")},
-      {"cone angles are", light("", R"({"type":"spot","spot":{"outerConeAngle":2}})")},
+      {"cone angles are", light("", R"({"type":"spot","spot":{"innerConeAngle":-0.1,"outerConeAngle":0.6}})")},
+      {"cone angles are", light("", R"({"type":"spot","spot":{"outerConeAngle":0}})")},
       {"has no direction", light(R"("scale":[0,0,0],)", R"({"type":"directional"})")},
       {"beyond 1e12", light(R"("translation":[1e13,0,0],)", R"({"type":"point"})")},
       {"yfov is 0", camera("", "0")},
@@ -548,13 +543,13 @@ TEST_F(GltfSceneFile, AChainOfAHundredThousandNodesIsNoRecursion) {
 }
 
 TEST_F(GltfSceneFile, OneFileIsNotReadOverAndOver) {
-  write("big.bin", std::string(1000, '\0'));
+  std::filesystem::resize_file(write("big.bin", ""), 1 << 26);  // takes no room on the disk
   Document document;
   document.materials = "[{}]";
-  for (int i = 0; i < 17; ++i)
+  for (int i = 0; i < 6; ++i)
     document.extra += i == 0 ? R"("images":[{"uri":"big.bin"})" : R"(,{"uri":"big.bin"})";
   document.extra += "],";
-  expect_error(document, "refers to one file more than 16 times");
+  expect_error(document, "refers to one file so often");
 }
 
 TEST(LoadScene, RefusesOptionsOutOfRange) {

@@ -117,7 +117,6 @@ TEST_F(Obj, EveryDefectIsAFileErrorThatSaysWhatIsWrong) {
       {triangle + "f 1 2 -4\n", "face 1 has the vertex index -4"},
       {triangle + "f 1 2 3\nf 1 x 3\n", "line 5 has 'x'"},
       {triangle + "f 1 2\n", "line 4 has 2 corners"},
-      {triangle + "f 1/ 2/ 3/\n", "line 4 has '1/'"},
       {triangle + "f 1/1/1/1 2 3\n", "line 4 has '1/1/1/1'"},
       {triangle + "f 1/1 2/1 3/1\n", "texture coordinate index 1, 0 are defined"},
       {triangle + "f 1//1 2//1 3//1\n", "normal index 1, 0 are defined"},
@@ -133,6 +132,61 @@ TEST_F(Obj, EveryDefectIsAFileErrorThatSaysWhatIsWrong) {
       EXPECT_THAT(error.what(), HasSubstr(defect.expected)) << defect.text;
     }
   }
+}
+
+TEST_F(Obj, ReadsLinesAsOtherProgramsWriteThem) {
+  const std::string vertices = "v 0 0 0\nv 1 0 0 # corner\nv 1 1 0\nv 0 1 1e-400\nvt 0 0\n";
+  const std::vector<std::string> quads = {"f 1 2 3 4 # quad\n",   "f 1 2 \\\n 3 4\n",      "f 1 2 \\\r\n 3 \\ \n4",
+                                          "f 1/ 2/ 3/ 4/\n",      "f 1/1/ 2/1/ 3/1/ 4/1/", "f 1// 2// 3// 4//\n",
+                                          "\tf\t1  2\t3 4 \r\n"};
+  for (const std::string& quad : quads) {
+    const TriangleMesh mesh = load_mesh(write("a.obj", "\xef\xbb\xbf# made\n" + vertices + quad));
+    EXPECT_EQ(mesh.triangles.size(), 2U) << quad;
+    EXPECT_NEAR(testing::total_area(mesh), 1.0, 1e-12) << quad;
+  }
+}
+
+// A roof of two quadrilaterals that meet at a right angle.
+TEST_F(Obj, SmoothingGroupsDecideWhichFacetsShareANormal) {
+  const std::string roof = "v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 1\nv 0 2 0\nv 1 2 0\n";
+  const auto ridge = [&](const std::string& first, const std::string& second) {
+    const TriangleMesh mesh = load_mesh(write("roof.obj", roof + first + "f 1 2 3 4\n" + second + "f 4 3 6 5\n"));
+    float least = 1.0F;  // cosine between normals and the facets they belong to
+    for (const glm::uvec3 t : mesh.triangles) {
+      const glm::vec3 facet(glm::normalize(testing::area_vector(mesh, t)));
+      for (int k = 0; k < 3; ++k) least = std::min(least, glm::dot(facet, mesh.normals[t[k]]));
+    }
+    return least;
+  };
+  EXPECT_NEAR(ridge("", ""), std::sqrt(0.5F), 1e-6);
+  EXPECT_NEAR(ridge("s 1\n", ""), std::sqrt(0.5F), 1e-6);
+  EXPECT_NEAR(ridge("s off\n", ""), 1.0, 1e-6);
+  EXPECT_NEAR(ridge("s 0\n", "s 0\n"), 1.0, 1e-6);
+  EXPECT_NEAR(ridge("s 1\n", "s 2\n"), 1.0, 1e-6);
+  // Each triangle for itself, in all of a fan of many about one vertex.
+  std::string fan = "s off\nv 0 0 1\n";
+  constexpr int kFacets = 20'000;
+  for (int i = 0; i <= kFacets; ++i) {
+    const double angle = 2.0 * M_PI * i / kFacets;
+    fan += "v " + std::to_string(std::cos(angle)) + " " + std::to_string(std::sin(angle)) + " 0\n";
+    if (i > 0) fan += "f 1 -2 -1\n";
+  }
+  EXPECT_EQ(load_mesh(write("fan.obj", fan)).positions.size(), 3U * kFacets);
+}
+
+// Teeth of 1 x 2 on a bar of height 1, too many for the search for ears among all corners.
+TEST_F(Obj, LargeConcavePolygonsAreNoFan) {
+  constexpr int kTeeth = 5000;
+  std::string text = "v 0 0 7\nv " + std::to_string(2 * kTeeth) + " 0 7\n";
+  for (int i = kTeeth; i-- > 0;) {
+    for (const auto& [x, y] : {std::pair(2 * i + 2, 1), std::pair(2 * i + 1, 1), std::pair(2 * i + 1, 3), std::pair(2 * i, 3)}) {
+      text += "v " + std::to_string(x) + " " + std::to_string(y) + " 7\n";
+    }
+  }
+  text += "f";
+  for (int i = 1; i <= 4 * kTeeth + 2; ++i) text += " " + std::to_string(i);
+  const TriangleMesh mesh = load_mesh(write("comb.obj", text));
+  EXPECT_NEAR(testing::total_area(mesh), 4.0 * kTeeth, 1e-6);  // an overlap would count twice
 }
 
 TEST_F(Obj, FilesThatAreNotMeshesAreRejected) {

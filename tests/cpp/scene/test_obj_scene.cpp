@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include <glm/geometric.hpp>
+
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/scene/load.hpp"
@@ -130,8 +132,7 @@ TEST_F(ObjSceneFile, DissolveIsTheOpacity) {
   EXPECT_EQ(red("d 1\nTr 1").opacity, 1.0F);
   EXPECT_EQ(red("Tr 0\nd 0.5").opacity, 0.5F);
   EXPECT_FALSE(red("d 0.5").opacity_cutoff);
-  expect_error("newmtl red\nd 1.5\n", "line 2: d '1.5', expected one number from 0 to 1");
-  expect_error("newmtl red\nTr nan\n", "line 2: Tr 'nan', expected one number from 0 to 1");
+  EXPECT_EQ(red("Tr 0.5 0.25 0").opacity, 0.75F);  // as a colour: their mean
 }
 
 TEST_F(ObjSceneFile, DissolveMapsAreAlphaOrElseGrey) {
@@ -167,24 +168,78 @@ TEST_F(ObjSceneFile, WhatIsLostIsCounted) {
                           "the material 'red' is not defined x1", "the material 'shiny' is not defined x1"));
 }
 
-TEST_F(ObjSceneFile, DefectsAreNamedWithTheirLine) {
+// As every loader does: the line is lost, the scene is not.
+TEST_F(ObjSceneFile, OddLinesOfALibraryAreWarnings) {
+  const std::vector<std::pair<std::string, std::string>> lines = {
+      {"Kd 1 1 1\nnewmtl red", "Kd '1 1 1', expected newmtl first"},
+      {"newmtl red\nKd 1 nan 1", "Kd '1 nan 1', expected one or three finite numbers"},
+      {"newmtl red\nKd 1 1", "Kd '1 1'"},
+      {"newmtl red\nKd spectral file.rfl", "Kd 'spectral file.rfl'"},
+      {"newmtl red\nKs -1 0 0", "Ks '-1 0 0'"},
+      {"newmtl red\nKe inf 0 0", "Ke 'inf 0 0'"},
+      {"newmtl red\nNs 1e99", "Ns '1e99', expected one finite number"},
+      {"newmtl red\nNi 0", "Ni '0', expected a refractive index above 0"},
+      {"newmtl red\nillum 99", "illum '99', expected 0 to 10"},
+      {"newmtl red\nd 1.5", "MTL d: values above 1 are taken as 1"},
+      {"newmtl red\nTr nan", "Tr 'nan'"},
+      {"newmtl red\nmap_Kd", "expected the name of an image"},
+      {"newmtl red\nmap_Kd -s x a.png", "expected a number after -s"},
+      {"newmtl red\nmap_Kd gone.png", "the image 'gone.png' does not exist"},
+      {"newmtl red\nmap_Kd ../text.png", "'../text.png' is not inside the file's own directory"},
+      {"newmtl red\nmap_Kd /etc/passwd", "'/etc/passwd' is not inside"}};
+  for (const auto& [text, expected] : lines) {
+    const LoadedScene loaded = load(text + "\nnewmtl shiny\n");
+    ASSERT_EQ(loaded.warnings.size(), 1U) << text;
+    EXPECT_THAT(loaded.warnings[0].message, HasSubstr(expected));
+    EXPECT_EQ(loaded.scene.materials[0].albedo_texture.texture, -1);
+  }
+  const LoadedScene outside = load_scene(write("escape.obj", std::string("mtllib ../other.mtl\n") + kTriangles));
+  EXPECT_THAT(outside.warnings.at(0).message, HasSubstr("'../other.mtl' is not inside"));
+}
+
+TEST_F(ObjSceneFile, ADamagedImageIsAnError) {
   write("text.png", "no image");
-  expect_error("Kd 1 1 1\n", "line 1: Kd '1 1 1', expected newmtl first");
-  expect_error("newmtl red\n\nKd 1 nan 1\n", "line 3: Kd '1 nan 1', expected one or three finite numbers");
-  expect_error("newmtl red\nKd 1 1\n", "line 2: Kd '1 1'");
-  expect_error("newmtl red\nKd spectral file.rfl\n", "line 2: Kd 'spectral file.rfl'");
-  expect_error("newmtl red\nKs -1 0 0\n", "line 2: Ks '-1 0 0'");
-  expect_error("newmtl red\nKe inf 0 0\n", "line 2: Ke 'inf 0 0'");
-  expect_error("newmtl red\nNs 1e99\n", "line 2: Ns '1e99', expected one finite number");
-  expect_error("newmtl red\nNi 0\n", "line 2: Ni '0', expected a refractive index above 0");
-  expect_error("newmtl red\nillum 99\n", "line 2: illum '99', expected 0 to 10");
-  expect_error("newmtl red\nmap_Kd\n", "expected the name of an image");
-  expect_error("newmtl red\nmap_Kd -s x a.png\n", "expected a number after -s");
-  expect_error("newmtl red\nmap_Kd gone.png\n", "gone.png: does not exist");
   expect_error("newmtl red\nmap_Kd text.png\n", "text.png: is not an EXR");
-  expect_error("newmtl red\nmap_Kd ../text.png\n", "refers to '../text.png', which is not inside");
-  expect_error("newmtl red\nmap_Kd /etc/passwd\n", "refers to '/etc/passwd', which is not inside");
-  EXPECT_THROW(load_scene(write("escape.obj", std::string("mtllib ../other.mtl\n") + kTriangles)), FileError);
+}
+
+TEST_F(ObjSceneFile, NamesMayHaveSpacesAroundThemAndOptionsBehind) {
+  Image image(2, 1, {"R", "G", "B"});
+  save_image((directory_ / "my map.png").string(), image);
+  const LoadedScene loaded = load("\xef\xbb\xbfnewmtl \t red\nmap_Kd my map.png -s 2 3 1\nnewmtl shiny \n");
+  EXPECT_THAT(loaded.warnings, IsEmpty());
+  EXPECT_EQ(loaded.scene.materials.at(0).albedo_texture.scale, glm::vec2(2, 3));
+  const std::string path = write("names.obj", std::string("mtllib .\\lib\\a.mtl\nusemtl  \tred \n") + kTriangles);
+  write("lib/a.mtl", "newmtl red\nKd 1 0 0\n");
+  EXPECT_EQ(load_scene(path).scene.materials.at(0).name, "red");
+}
+
+// The white of Rec. 709 is (0.9505, 1, 1.0891) in XYZ (IEC 61966-2-1).
+TEST_F(ObjSceneFile, ColoursInXyzBecomeRec709) {
+  const Material m = red("Kd xyz 0.47525 0.5 0.54455");
+  EXPECT_LT(glm::length(m.albedo - glm::vec3(0.5F)), 1e-3F);
+}
+
+TEST_F(ObjSceneFile, GroupsAreTheObjectsWhereNoneIsNamed) {
+  const std::string quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+  const auto names = [&](const std::string& text) {
+    std::vector<std::string> result;
+    for (const Object& object : load_scene(write("g.obj", quad + text)).scene.objects) result.push_back(object.name);
+    return result;
+  };
+  EXPECT_THAT(names("g body\nf 1 2 3\ng lid top\nf 1 3 4\n"), ElementsAre("body", "lid top"));
+  EXPECT_THAT(names("g body\nf 1 2 3\no all\ng lid\nf 1 3 4\n"), ElementsAre("object", "all"));
+}
+
+TEST_F(ObjSceneFile, WhatIsNoTriangleIsCountedAndColoursAreKept) {
+  const LoadedScene loaded = load_scene(
+      write("v.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 1 1 0\nl 1 2\nl 2 3\np 1\ncurv 0 1 1 2 3\nf 1 2 3\n"));
+  EXPECT_THAT(messages(loaded), ElementsAre("lines are not supported x2", "points are not supported x1",
+                                            "curves and surfaces are not supported x1"));
+  const std::vector<glm::vec3>& colors = loaded.scene.objects.at(0).mesh.colors;
+  ASSERT_EQ(colors.size(), 3U);
+  EXPECT_EQ(colors[0], glm::vec3(1, 0, 0));
+  EXPECT_NEAR(colors[1].y, 0.2140F, 1e-3F);  // 0.5 in sRGB
+  EXPECT_EQ(colors[2], glm::vec3(1.0F));
 }
 
 }  // namespace

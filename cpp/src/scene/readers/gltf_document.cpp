@@ -10,7 +10,10 @@
 #include <map>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
 #include "file_bytes.hpp"
+#include "gltf_compression.hpp"
 #include "mirrorbake/core/error.hpp"
 
 namespace mirrorbake::gltf {
@@ -18,12 +21,15 @@ namespace {
 
 // tinygltf converts `extras` and `extensions` by recursion.
 constexpr int kMaxJsonDepth = 256;
-// How often a document may refer to the same file.
-constexpr int kMaxReads = 16;
+// How many bytes a document may take by referring to the same files again.
+constexpr std::uint64_t kMaxRepeatedBytes = std::uint64_t{1} << 28;
 
-constexpr std::array<std::string_view, 6> kKnown = {
-    "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior",
-    "KHR_materials_unlit", "KHR_mesh_quantization",           "KHR_texture_transform"};
+constexpr std::array<std::string_view, 9> kKnown = {
+    "EXT_meshopt_compression",    "EXT_texture_webp",
+    "KHR_draco_mesh_compression", "KHR_lights_punctual",
+    "KHR_materials_ior",          "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",        "KHR_mesh_quantization",
+    "KHR_texture_transform"};
 
 // What tinygltf would let pass: deep nesting, and negative sizes, which it takes for absent ones.
 void check_json(const std::string& path, std::string_view json) {
@@ -51,6 +57,58 @@ void check_json(const std::string& path, std::string_view json) {
   }
 }
 
+// tinygltf asks for a view of every accessor of indices and for data of every buffer, which compressed files do not have:
+// their accessors may stand for what Draco decodes, and their buffers for what meshoptimizer does. They get a view of this
+// name and a buffer of one byte. Nothing for files that need no such change.
+constexpr const char* kPlaceholder = "\x01placeholder";
+
+std::optional<std::string> without_placeholders(std::string_view json) {
+  if (json.find(kDraco) == std::string_view::npos && json.find(kMeshopt) == std::string_view::npos) return std::nullopt;
+  nlohmann::json document = nlohmann::json::parse(json.begin(), json.end(), nullptr, false);
+  if (!document.is_object() || !document["buffers"].is_array() || !document["accessors"].is_array() ||
+      !document["bufferViews"].is_array()) {
+    return std::nullopt;  // tinygltf will say what is wrong
+  }
+  nlohmann::json& buffers = document["buffers"];
+  const nlohmann::json empty = {{"byteLength", 1}, {"uri", "data:application/octet-stream;base64,AA=="}};
+  for (nlohmann::json& buffer : buffers) {
+    const bool is_fallback = buffer.is_object() && !buffer.contains("uri") && buffer.contains("extensions") &&
+                             buffer["extensions"].is_object() && buffer["extensions"].contains(kMeshopt);
+    if (is_fallback) buffer = empty;
+  }
+  const std::size_t view = document["bufferViews"].size();
+  document["bufferViews"].push_back({{"buffer", buffers.size()}, {"byteLength", 1}, {"name", kPlaceholder}});
+  buffers.push_back(empty);
+  for (nlohmann::json& accessor : document["accessors"]) {
+    if (accessor.is_object() && !accessor.contains("bufferView")) accessor["bufferView"] = view;
+  }
+  return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+// A binary file with another text, of which it has `size` bytes.
+std::string with_json(const std::string& bytes, std::size_t size, std::string json) {
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const auto word = [](std::size_t value) {
+    const auto number = static_cast<std::uint32_t>(value);
+    return std::string(reinterpret_cast<const char*>(&number), sizeof number);
+  };
+  const std::string chunks = bytes.substr(20 + size);
+  return bytes.substr(0, 8) + word(20 + json.size() + chunks.size()) + word(json.size()) + bytes.substr(16, 4) + json +
+         chunks;
+}
+
+// Before tinygltf, to which such a file is an empty one or an error about something else.
+bool is_version_1(bool binary, std::string_view bytes) {
+  if (binary) return bytes.size() > 4 && bytes[4] == 1;
+  const std::size_t asset = bytes.find("\"asset\"");
+  if (asset == std::string_view::npos) return bytes.find("\"techniques\"") != std::string_view::npos;
+  const std::string_view object = bytes.substr(asset, std::min(bytes.find('}', asset), bytes.size()) - asset);
+  const std::size_t version = object.find("\"version\"");
+  if (version == std::string_view::npos) return false;
+  const std::size_t digit = object.find_first_of("0123456789", version);
+  return digit != std::string_view::npos && object[digit] == '1';
+}
+
 bool is_binary(std::string_view bytes) { return bytes.substr(0, 4) == "glTF"; }
 
 // The text of a binary file: the first chunk after the header of 12 bytes (glTF 2.0 §4.4).
@@ -70,6 +128,7 @@ struct Directory {
   std::string refused;   // the first reference that points outside
   std::string repeated;  // the first file that is referred to too often
   std::map<std::filesystem::path, int> reads;
+  std::uint64_t repeated_bytes = 0;
 
   std::optional<std::filesystem::path> resolve(const std::string& joined) {
     const std::string prefix = root.string() + "/";
@@ -80,7 +139,18 @@ struct Directory {
   }
 };
 
+// tinygltf knows seven media types, and takes URIs of data with another type or a character set for names of files.
+std::optional<std::string_view> data_uri(std::string_view joined) {
+  const std::size_t at = joined.find("data:");
+  if (at == std::string_view::npos || (at > 0 && joined[at - 1] != '/')) return std::nullopt;
+  constexpr std::string_view kBase64 = ";base64,";
+  const std::size_t end = joined.find(kBase64, at);
+  if (end == std::string_view::npos) return std::nullopt;
+  return joined.substr(end + kBase64.size());
+}
+
 bool file_exists(const std::string& joined, void* user) {
+  if (data_uri(joined)) return true;
   const auto target = static_cast<Directory*>(user)->resolve(joined);
   std::error_code code;
   return target && std::filesystem::is_regular_file(*target, code);
@@ -88,15 +158,22 @@ bool file_exists(const std::string& joined, void* user) {
 
 bool read_whole_file(std::vector<unsigned char>* out, std::string* error, const std::string& joined,
                      void* user) {
+  if (const auto encoded = data_uri(joined)) {
+    *out = base64_decoded(*encoded);
+    return true;
+  }
   Directory& directory = *static_cast<Directory*>(user);
   const auto target = directory.resolve(joined);
   if (!target) return false;
-  // Each reference holds a copy of the file: a short text must not fill the memory.
-  if (++directory.reads[*target] > kMaxReads) {
-    directory.repeated = joined;
-    return false;
-  }
   try {
+    // Each reference holds a copy of the file: a short text must not fill the memory.
+    std::error_code code;
+    const std::uintmax_t size = std::filesystem::file_size(*target, code);
+    if (!code && ++directory.reads[*target] > 1) directory.repeated_bytes += size;
+    if (directory.repeated_bytes > kMaxRepeatedBytes) {
+      directory.repeated = joined;
+      return false;
+    }
     const std::string bytes = read_file(*target);
     out->assign(bytes.begin(), bytes.end());
     return true;
@@ -176,6 +253,9 @@ struct Elements {
 
 Elements locate(const std::string& path, const tinygltf::Model& model, int view_index, std::size_t offset,
                 std::size_t count, std::size_t element_size, const std::string& what) {
+  // glTF 2.0 §3.6.2.1: zeros, which a sparse accessor replaces.
+  static constexpr std::array<unsigned char, 64> kZeros{};
+  if (view_index == -1) return {kZeros.data(), 0};
   const std::span<const unsigned char> bytes = view_bytes(path, model, view_index, what);
   const tinygltf::BufferView& view = model.bufferViews[static_cast<std::size_t>(view_index)];
   // glTF 2.0 §3.6.2.4 allows 4 to 252.
@@ -232,13 +312,14 @@ bool is_index_type(int type) {
          type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
 }
 
-// Sparse replacements, glTF 2.0 §3.6.2.3.
+// Calls put(index, place of its values) for the sparse replacements, glTF 2.0 §3.6.2.3, of elements of `size` bytes.
+template <typename Put>
 void apply_sparse(const std::string& path, const tinygltf::Model& model, const tinygltf::Accessor& accessor,
-                  const std::string& what, Numbers& numbers) {
+                  const std::string& what, std::size_t size, const Put& put) {
   const auto& sparse = accessor.sparse;
-  const std::size_t components = static_cast<std::size_t>(numbers.components);
-  const std::size_t size = static_cast<std::size_t>(component_size(accessor.componentType));
-  if (sparse.count < 0 || static_cast<std::size_t>(sparse.count) > numbers.count ||
+  if (!sparse.isSparse) return;
+  if (sparse.count < 0 || static_cast<std::size_t>(sparse.count) > accessor.count ||
+      sparse.indices.bufferView < 0 || sparse.values.bufferView < 0 ||
       !is_index_type(sparse.indices.componentType)) {
     fail(path, what + " has an invalid sparse accessor");
   }
@@ -249,14 +330,11 @@ void apply_sparse(const std::string& path, const tinygltf::Model& model, const t
              count, index_size, what + " sparse index");
   const Elements from =
       locate(path, model, sparse.values.bufferView, static_cast<std::size_t>(sparse.values.byteOffset), count,
-             components * size, what + " sparse value");
+             size, what + " sparse value");
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t index = decode_index(at.data + i * at.stride, sparse.indices.componentType);
-    if (index >= numbers.count) fail(path, what + " sparse index is " + std::to_string(index));
-    for (std::size_t k = 0; k < components; ++k) {
-      numbers.values[index * components + k] =
-          decode(from.data + i * from.stride + k * size, accessor.componentType, accessor.normalized);
-    }
+    if (index >= accessor.count) fail(path, what + " sparse index is " + std::to_string(index));
+    put(index, from.data + i * from.stride);
   }
 }
 
@@ -285,13 +363,38 @@ std::string percent_decoded(const std::string& uri) {
   return decoded;
 }
 
+// RFC 4648; what is no digit is skipped, and a space is a "+" that percent-decoding took for one.
+std::vector<unsigned char> base64_decoded(std::string_view text) {
+  std::vector<unsigned char> bytes;
+  std::uint32_t group = 0;
+  int bits = 0;
+  for (const char c : text) {
+    int digit = -1;
+    if (c >= 'A' && c <= 'Z') digit = c - 'A';
+    if (c >= 'a' && c <= 'z') digit = c - 'a' + 26;
+    if (c >= '0' && c <= '9') digit = c - '0' + 52;
+    if (c == '+' || c == ' ' || c == '-') digit = 62;
+    if (c == '/' || c == '_') digit = 63;
+    if (digit < 0) continue;
+    group = group << 6 | static_cast<std::uint32_t>(digit);
+    bits += 6;
+    if (bits < 8) continue;
+    bits -= 8;
+    bytes.push_back(static_cast<unsigned char>(group >> bits));
+  }
+  return bytes;
+}
+
 void fail(const std::string& path, std::string_view problem) { throw FileError(path, problem); }
 
 tinygltf::Model read_document(const std::string& path) {
-  const std::string bytes = read_file(path);
+  std::string bytes = read_file(path);
   if (bytes.size() > std::numeric_limits<std::int32_t>::max()) fail(path, "is larger than 2 GiB");
   const bool binary = is_binary(bytes);
-  check_json(path, binary ? json_chunk(path, bytes) : std::string_view(bytes));
+  if (is_version_1(binary, bytes)) fail(path, "is a glTF 1.0 file, expected glTF 2.0");
+  const std::string_view json = binary ? json_chunk(path, bytes) : std::string_view(bytes);
+  check_json(path, json);
+  if (const auto text = without_placeholders(json)) bytes = binary ? with_json(bytes, json.size(), *text) : *text;
 
   std::error_code code;
   Directory directory{std::filesystem::weakly_canonical(path, code).parent_path(), {}, {}, {}};
@@ -316,7 +419,8 @@ tinygltf::Model read_document(const std::string& path) {
     fail(path, "refers to '" + directory.refused + "', which is not inside the file's own directory");
   }
   if (!directory.repeated.empty()) {
-    fail(path, "refers to one file more than " + std::to_string(kMaxReads) + " times: " + directory.repeated);
+    fail(path, "refers to one file so often that it would take more than " +
+                   std::to_string(kMaxRepeatedBytes >> 20) + " MiB: " + directory.repeated);
   }
   if (!is_good) fail(path, "is not a valid glTF file: " + one_line(errors));
   for (const std::string& extension : model.extensionsRequired) {
@@ -324,6 +428,13 @@ tinygltf::Model read_document(const std::string& path) {
       fail(path, "requires the extension " + extension + ", which is not supported");
     }
   }
+  for (tinygltf::Accessor& accessor : model.accessors) {
+    if (accessor.bufferView >= 0 && static_cast<std::size_t>(accessor.bufferView) < model.bufferViews.size() &&
+        model.bufferViews[static_cast<std::size_t>(accessor.bufferView)].name == kPlaceholder) {
+      accessor.bufferView = -1;
+    }
+  }
+  decompress_views(path, model);
   return model;
 }
 
@@ -365,7 +476,11 @@ Numbers read_numbers(const std::string& path, const tinygltf::Model& model, int 
           decode(elements.data + i * elements.stride + k * size, accessor.componentType, accessor.normalized);
     }
   }
-  if (accessor.sparse.isSparse) apply_sparse(path, model, accessor, name, numbers);
+  apply_sparse(path, model, accessor, name, components * size, [&](std::size_t i, const unsigned char* from) {
+    for (std::size_t k = 0; k < components; ++k) {
+      numbers.values[i * components + k] = decode(from + k * size, accessor.componentType, accessor.normalized);
+    }
+  });
   return numbers;
 }
 
@@ -373,8 +488,7 @@ std::vector<std::uint32_t> read_indices(const std::string& path, const tinygltf:
                                         std::string_view what) {
   const std::string name(what);
   const tinygltf::Accessor& accessor = element(path, model.accessors, index, name + " accessor");
-  if (accessor.type != TINYGLTF_TYPE_SCALAR || !is_index_type(accessor.componentType) ||
-      accessor.sparse.isSparse) {
+  if (accessor.type != TINYGLTF_TYPE_SCALAR || !is_index_type(accessor.componentType)) {
     fail(path,
          name + " accessor " + std::to_string(index) + " has the wrong type, expected unsigned integers");
   }
@@ -385,6 +499,9 @@ std::vector<std::uint32_t> read_indices(const std::string& path, const tinygltf:
   for (std::size_t i = 0; i < indices.size(); ++i) {
     indices[i] = decode_index(elements.data + i * elements.stride, accessor.componentType);
   }
+  apply_sparse(path, model, accessor, name, size, [&](std::size_t i, const unsigned char* from) {
+    indices[i] = decode_index(from, accessor.componentType);
+  });
   return indices;
 }
 

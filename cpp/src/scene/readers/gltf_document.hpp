@@ -21,6 +21,9 @@ tinygltf::Model read_document(const std::string& path);
 /// The name of a file that a URI of the document means: "%20" is a space, and so on.
 std::string percent_decoded(const std::string& uri);
 
+/// Bytes of a base64 text, as data URIs have them.
+std::vector<unsigned char> base64_decoded(std::string_view text);
+
 /// Whether the name is that of an extension that this reader applies.
 bool is_known_extension(std::string_view name);
 

@@ -48,11 +48,11 @@ const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const
   return it == extensions.end() || !it->second.IsObject() ? nullptr : &it->second;
 }
 
-double unit_factor(const std::string& path, const std::string& what, double value) {
-  if (!(value >= 0.0 && value <= 1.0)) {
-    fail(path, what + " is " + text_of(value) + ", expected 0 to 1");
-  }
-  return value;
+// Exporters round factors to a little more than 1.
+float unit_factor(const std::string& path, const std::string& what, double value, Warnings& warnings) {
+  if (!std::isfinite(value)) fail(path, what + " is " + text_of(value) + ", expected 0 to 1");
+  if (value < 0.0 || value > 1.0) warnings.add(what + " is cut to 0 to 1");
+  return static_cast<float>(std::clamp(value, 0.0, 1.0));
 }
 
 // The value in the middle of a texel of an image of some other size.
@@ -144,6 +144,15 @@ std::optional<MaterialReader::Use> MaterialReader::use_of(int texture, int uv_se
   const tinygltf::Texture& t = element(path_, model_.textures, texture, what + " texture");
   Use use;
   use.image = t.source;
+  const tinygltf::Value* webp = extension(t.extensions, "EXT_texture_webp");
+  if (webp != nullptr && webp->Get("source").IsNumber()) {
+    const double source = webp->Get("source").GetNumberAsDouble();
+    use.image = source >= 0.0 && source < static_cast<double>(model_.images.size()) ? static_cast<int>(source) : -2;
+  }
+  if (use.image == -1) {
+    warnings_.add("textures without an image that is known are left out");
+    return std::nullopt;
+  }
   element(path_, model_.images, use.image, what + " image");
   if (t.sampler >= 0) {
     const tinygltf::Sampler& sampler = element(path_, model_.samplers, t.sampler, what + " sampler");
@@ -169,16 +178,20 @@ int MaterialReader::uv_set(int material) {
   const auto& pbr = m.pbrMetallicRoughness;
   const std::string where = "material " + std::to_string(material) + " ";
   std::optional<int> first;
-  for (const auto& [info, name] : {std::pair(&pbr.baseColorTexture, "base colour"),
-                                   std::pair(&pbr.metallicRoughnessTexture, "metallic-roughness"),
-                                   std::pair(&m.emissiveTexture, "emissive")}) {
-    const std::optional<Use> use = use_of(info->index, info->texCoord, info->extensions, where + name);
-    if (!use) continue;
+  const auto note = [&](const std::optional<Use>& use) {
+    if (!use) return;
     if (!first) first = use->uv_set;
     if (use->uv_set != *first) {
       warnings_.add("a material uses several sets of texture coordinates; all its textures use the first");
     }
+  };
+  for (const auto& [info, name] : {std::pair(&pbr.baseColorTexture, "base colour"),
+                                   std::pair(&pbr.metallicRoughnessTexture, "metallic-roughness"),
+                                   std::pair(&m.emissiveTexture, "emissive")}) {
+    note(use_of(info->index, info->texCoord, info->extensions, where + name));
   }
+  const auto& normal = m.normalTexture;
+  note(use_of(normal.index, normal.texCoord, normal.extensions, where + "normal"));
   return first.value_or(0);
 }
 
@@ -195,6 +208,12 @@ auto MaterialReader::read_image(int index, const Read& read) const {
   const std::string name = path_ + ": image " + std::to_string(index);
   if (image.bufferView >= 0) return read(name, view_bytes(path_, model_, image.bufferView, "image"));
   if (image.uri.empty()) return read(name, std::span(image.image));
+  constexpr std::string_view kBase64 = ";base64,";
+  const std::size_t data = image.uri.starts_with("data:") ? image.uri.find(kBase64) : std::string::npos;
+  if (data != std::string::npos) {
+    const auto decoded = base64_decoded(std::string_view(image.uri).substr(data + kBase64.size()));
+    return read(name, std::span(decoded.data(), decoded.size()));
+  }
   const std::string file = image_file(image);
   const std::string bytes = read_file(file);
   return read(file, std::span(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
@@ -228,7 +247,7 @@ TextureReference MaterialReader::made_texture(const Use& use, const std::string&
 TextureReference MaterialReader::plain_texture(const Use& use) {
   return made_texture(use, "image " + std::to_string(use.image), [&] {
     const tinygltf::Image& image = element(path_, model_.images, use.image, "image");
-    if (image.bufferView < 0 && !image.uri.empty()) {
+    if (image.bufferView < 0 && !image.uri.empty() && !image.uri.starts_with("data:")) {
       return reader_.read_file_texture(image_file(image), Transfer::srgb);
     }
     Texture texture;
@@ -245,9 +264,9 @@ MaterialReader::Parameters MaterialReader::parameters(const tinygltf::Material& 
   p.base = reflectance(path_, where + "baseColorFactor",
                        glm::vec3(pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]),
                        warnings_);
-  p.alpha = static_cast<float>(unit_factor(path_, where + "baseColorFactor's alpha", pbr.baseColorFactor[3]));
-  p.metallic = static_cast<float>(unit_factor(path_, where + "metallicFactor", pbr.metallicFactor));
-  p.roughness = static_cast<float>(unit_factor(path_, where + "roughnessFactor", pbr.roughnessFactor));
+  p.alpha = unit_factor(path_, where + "baseColorFactor's alpha", pbr.baseColorFactor[3], warnings_);
+  p.metallic = unit_factor(path_, where + "metallicFactor", pbr.metallicFactor, warnings_);
+  p.roughness = unit_factor(path_, where + "roughnessFactor", pbr.roughnessFactor, warnings_);
   if (const tinygltf::Value* ior = extension(material.extensions, "KHR_materials_ior")) {
     const double n = number_property(path_, *ior, "ior", 1.5, where + "KHR_materials_ior");
     // 0 stands for an infinite index.
@@ -287,6 +306,7 @@ void MaterialReader::set_colours(const Parameters& p, Material& result) {
   if (!varying && (!base || metallic == 0.0F || metallic == 1.0F)) {
     result.albedo = p.base * (1.0F - metallic);
     result.fresnel.r0 = glm::mix(glm::vec3(p.dielectric_r0), p.base, metallic);
+    result.colors_tint_reflectance = metallic == 1.0F;
     if (!base) return;
     const TextureReference texture = plain_texture(*base);
     if (metallic == 0.0F) result.albedo_texture = texture;
@@ -377,8 +397,22 @@ void MaterialReader::set_opacity(const tinygltf::Material& material, const Param
       });
 }
 
+// glTF 2.0 §3.9.3.
+void MaterialReader::set_normal(const tinygltf::Material& material, const std::string& where, Material& result) {
+  const auto& info = material.normalTexture;
+  const std::optional<Use> use = use_of(info.index, info.texCoord, info.extensions, where + "normal");
+  if (!use) return;
+  if (!std::isfinite(info.scale)) fail(path_, where + "normal scale is not finite");
+  result.normal_scale = static_cast<float>(std::clamp(info.scale, -1e6, 1e6));
+  result.normal_texture =
+      made_texture(*use, "normal " + std::to_string(use->image), [&]() -> std::optional<Texture> {
+        Texture texture;
+        texture.image = decode(use->image, Transfer::linear);
+        return texture;
+      });
+}
+
 void MaterialReader::warn_of_what_is_lost(const tinygltf::Material& material) {
-  if (material.normalTexture.index >= 0) warnings_.add("normal textures are not supported");
   if (material.occlusionTexture.index >= 0) {
     warnings_.add("occlusion textures are not used: the ray tracer finds what is occluded");
   }
@@ -389,6 +423,7 @@ Material MaterialReader::convert(const tinygltf::Material& material, const std::
   const Parameters p = parameters(material, where);
   warn_of_what_is_lost(material);
   set_opacity(material, p, where, result);
+  set_normal(material, where, result);
   if (extension(material.extensions, "KHR_materials_unlit") != nullptr) {
     // The colour is what the eye sees, whatever the light.
     result.albedo = glm::vec3(0.0F);

@@ -53,6 +53,7 @@ class MaterialReader {
   void set_roughness(const Parameters& p, Material& result);
   void set_opacity(const tinygltf::Material& material, const Parameters& p, const std::string& where,
                    Material& result);
+  void set_normal(const tinygltf::Material& material, const std::string& where, Material& result);
   void warn_of_what_is_lost(const tinygltf::Material& material);
 
   std::string image_file(const tinygltf::Image& image) const;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -9,6 +10,7 @@
 #include <glm/matrix.hpp>
 #include <glm/vec4.hpp>
 
+#include "gltf_compression.hpp"
 #include "gltf_document.hpp"
 #include "gltf_mesh.hpp"
 #include "gltf_nodes.hpp"
@@ -44,6 +46,28 @@ std::vector<glm::uvec3> triangles_of(const std::string& path, int mode,
   return triangles;
 }
 
+// A primitive as the file has it, in the node's space. What it does not have is empty.
+struct Vertices {
+  std::vector<glm::vec3> positions, normals, colors;
+  std::vector<glm::vec2> uvs;
+  std::vector<glm::uvec3> triangles;
+};
+
+// Every triangle with three vertices of its own.
+Vertices unshared(const Vertices& shared) {
+  Vertices result;
+  for (const glm::uvec3 t : shared.triangles) {
+    const std::uint32_t first = static_cast<std::uint32_t>(result.positions.size());
+    result.triangles.push_back({first, first + 1, first + 2});
+    for (int k = 0; k < 3; ++k) {
+      result.positions.push_back(shared.positions[t[k]]);
+      if (!shared.uvs.empty()) result.uvs.push_back(shared.uvs[t[k]]);
+      if (!shared.colors.empty()) result.colors.push_back(shared.colors[t[k]]);
+    }
+  }
+  return result;
+}
+
 class GltfBuilder {
  public:
   GltfBuilder(const std::string& path, const tinygltf::Model& model, const MeshLimits& limits,
@@ -53,8 +77,6 @@ class GltfBuilder {
   void add_node(int index, const tinygltf::Node& node, const glm::dmat4& world_from_node) {
     if (node.mesh < 0) return;
     const tinygltf::Mesh& mesh = gltf::element(path_, model_.meshes, node.mesh, "mesh");
-    const std::size_t first_vertex = loaded_.mesh.positions.size();
-    const std::size_t first_triangle = loaded_.mesh.triangles.size();
     const std::string& name = node.name.empty() ? mesh.name : node.name;
     for (const tinygltf::Primitive& primitive : mesh.primitives) {
       const bool has_triangles = primitive.mode == TINYGLTF_MODE_TRIANGLES ||
@@ -62,11 +84,13 @@ class GltfBuilder {
                                  primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN;
       if (has_triangles) add_primitive(primitive, index, name, world_from_node);
     }
-    complete_normals(loaded_.mesh, first_vertex, first_triangle);
   }
 
   LoadedMesh finish() {
-    if (!has_uvs_) loaded_.mesh.uvs.clear();
+    TriangleMesh& mesh = loaded_.mesh;
+    if (!has_uvs_) mesh.uvs.clear();
+    if (!has_colors_) mesh.colors.clear();
+    complete_normals(mesh);
     return std::move(loaded_);
   }
 
@@ -78,32 +102,138 @@ class GltfBuilder {
 
   void add_primitive(const tinygltf::Primitive& primitive, int node, const std::string& name,
                      const glm::dmat4& world_from_node) {
+    if (attribute(primitive, "POSITION") < 0) fail(path_, "mesh of node '" + name + "' has no positions");
+    const auto draco = primitive.extensions.find(gltf::kDraco);
+    Vertices vertices = draco != primitive.extensions.end() ? decompressed(primitive, draco->second) : read(primitive);
+    // glTF 2.0 §3.7.2.1: without normals, facets are flat.
+    const bool is_flat = vertices.normals.empty();
     TriangleMesh& mesh = loaded_.mesh;
-    const int position_accessor = attribute(primitive, "POSITION");
-    if (position_accessor < 0) fail(path_, "mesh of node '" + name + "' has no positions");
-    // The limits come before anything is read.
-    const std::size_t vertex_count = gltf::element_count(path_, model_, position_accessor, "position");
-    check_limits(path_, mesh.positions.size() + vertex_count, mesh.triangles.size(), limits_);
-    const gltf::Numbers positions =
-        gltf::read_numbers(path_, model_, position_accessor, TINYGLTF_TYPE_VEC3, "position");
+    check_limits(path_, mesh.positions.size() + (is_flat ? 3 * vertices.triangles.size() : vertices.positions.size()),
+                 mesh.triangles.size() + vertices.triangles.size(), limits_);
+    if (is_flat) vertices = unshared(vertices);
+    append(vertices, world_from_node);
+    loaded_.groups.push_back({name, node, primitive.material, mesh.triangles.size() - vertices.triangles.size()});
+  }
 
-    const std::vector<glm::uvec3> triangles = read_triangles(primitive, vertex_count);
-    check_limits(path_, mesh.positions.size() + vertex_count, mesh.triangles.size() + triangles.size(),
-                 limits_);
-
+  void append(const Vertices& vertices, const glm::dmat4& world_from_node) {
+    TriangleMesh& mesh = loaded_.mesh;
     const std::uint32_t first = static_cast<std::uint32_t>(mesh.positions.size());
-    for (std::size_t i = 0; i < vertex_count; ++i) {
-      const float* p = positions.values.data() + 3 * i;
-      mesh.positions.push_back(glm::vec3(world_from_node * glm::dvec4(p[0], p[1], p[2], 1.0)));
+    for (const glm::vec3 p : vertices.positions) {
+      mesh.positions.push_back(glm::vec3(world_from_node * glm::dvec4(p, 1.0)));
     }
     check_positions(path_, mesh.positions, first);
-    add_normals(primitive, vertex_count, world_from_node);
-    add_uvs(primitive, vertex_count);
-
-    loaded_.groups.push_back({name, node, primitive.material, mesh.triangles.size()});
-    const bool is_mirrored = glm::determinant(glm::dmat3(world_from_node)) < 0.0;
-    for (const glm::uvec3 t : triangles) {
+    const glm::dmat3 m(world_from_node);
+    const bool is_mirrored = glm::determinant(m) < 0.0;
+    for (const glm::uvec3 t : vertices.triangles) {
       mesh.triangles.push_back((is_mirrored ? glm::uvec3(t.x, t.z, t.y) : t) + first);
+    }
+    // Normals follow the cofactors, which, unlike the inverse, exist for flat transforms too.
+    const double sign = is_mirrored ? -1.0 : 1.0;
+    const glm::dmat3 cofactors(sign * glm::cross(m[1], m[2]), sign * glm::cross(m[2], m[0]),
+                               sign * glm::cross(m[0], m[1]));
+    // Of flat facets, which have three vertices of their own, they are the facets' own.
+    for (const glm::vec3 n : vertices.normals) {
+      const glm::dvec3 turned = cofactors * glm::dvec3(n);
+      const double length = glm::length(turned);
+      mesh.normals.push_back(length > 0.0 ? glm::vec3(turned / length) : glm::vec3(0.0F));
+    }
+    for (std::size_t i = mesh.normals.size(); i < mesh.positions.size(); i += 3) {
+      const glm::dvec3 corner(mesh.positions[i]);
+      const glm::dvec3 across = glm::cross(glm::dvec3(mesh.positions[i + 1]) - corner, glm::dvec3(mesh.positions[i + 2]) - corner);
+      const double length = glm::length(across);
+      const glm::vec3 facet(length > 0.0 ? (is_mirrored ? -across : across) / length : glm::dvec3(0.0));
+      mesh.normals.insert(mesh.normals.end(), 3, facet);
+    }
+    mesh.uvs.insert(mesh.uvs.end(), vertices.uvs.begin(), vertices.uvs.end());
+    mesh.uvs.resize(mesh.positions.size(), glm::vec2(0.0F));
+    mesh.colors.insert(mesh.colors.end(), vertices.colors.begin(), vertices.colors.end());
+    mesh.colors.resize(mesh.positions.size(), glm::vec3(1.0F));
+    has_uvs_ = has_uvs_ || !vertices.uvs.empty();
+    has_colors_ = has_colors_ || !vertices.colors.empty();
+  }
+
+  // The numbers of an attribute, one row for each vertex; nothing if there is none. `type` 0 stands for VEC3 or VEC4.
+  gltf::Numbers numbers(const tinygltf::Primitive& primitive, const std::string& name, int type, const char* what,
+                        std::size_t vertex_count) const {
+    const int accessor = attribute(primitive, name);
+    if (accessor < 0) return {};
+    const tinygltf::Accessor& source = gltf::element(path_, model_.accessors, accessor, std::string(what) + " accessor");
+    if (source.count != vertex_count) {
+      fail(path_, std::string("number of ") + what + "s is " + std::to_string(source.count) +
+                      ", expected one for each of " + std::to_string(vertex_count) + " vertices");
+    }
+    const bool is_any = type == 0;
+    if (is_any) type = source.type == TINYGLTF_TYPE_VEC4 ? TINYGLTF_TYPE_VEC4 : TINYGLTF_TYPE_VEC3;
+    return gltf::read_numbers(path_, model_, accessor, type, what);
+  }
+
+  Vertices read(const tinygltf::Primitive& primitive) const {
+    // The limits come before anything is read.
+    const std::size_t count = gltf::element_count(path_, model_, attribute(primitive, "POSITION"), "position");
+    check_limits(path_, loaded_.mesh.positions.size() + count, loaded_.mesh.triangles.size(), limits_);
+    Vertices result;
+    set_rows(numbers(primitive, "POSITION", TINYGLTF_TYPE_VEC3, "position", count), result.positions);
+    result.triangles = read_triangles(primitive, count);
+    set_normals(numbers(primitive, "NORMAL", TINYGLTF_TYPE_VEC3, "normal", count), result);
+    set_uvs(numbers(primitive, uv_name(primitive), TINYGLTF_TYPE_VEC2, "texture coordinate", count), result);
+    set_colors(numbers(primitive, "COLOR_0", 0, "colour", count), result);
+    return result;
+  }
+
+  Vertices decompressed(const tinygltf::Primitive& primitive, const tinygltf::Value& extension) const {
+    const std::size_t count = gltf::element_count(path_, model_, attribute(primitive, "POSITION"), "position");
+    check_limits(path_, loaded_.mesh.positions.size() + count, loaded_.mesh.triangles.size(), limits_);
+    const gltf::DracoMesh mesh(path_, model_, extension, limits_);
+    Vertices result;
+    set_rows(mesh.numbers("POSITION", 3), result.positions);
+    if (result.positions.empty()) fail(path_, "a Draco mesh has no positions");
+    result.triangles = mesh.triangles();
+    set_normals(mesh.numbers("NORMAL", 3), result);
+    set_uvs(mesh.numbers(uv_name(primitive), 2), result);
+    set_colors(mesh.numbers("COLOR_0", 0), result);
+    return result;
+  }
+
+  std::string uv_name(const tinygltf::Primitive& primitive) const {
+    return "TEXCOORD_" + std::to_string(uv_set_(primitive.material));
+  }
+
+  static void set_rows(const gltf::Numbers& numbers, std::vector<glm::vec3>& rows) {
+    rows.resize(numbers.count);
+    for (std::size_t i = 0; i < numbers.count; ++i) {
+      const float* v = numbers.values.data() + i * static_cast<std::size_t>(numbers.components);
+      rows[i] = {v[0], v[1], v[2]};
+    }
+  }
+
+  void set_normals(const gltf::Numbers& numbers, Vertices& vertices) const {
+    set_rows(numbers, vertices.normals);
+    for (std::size_t i = 0; i < vertices.normals.size(); ++i) {
+      const glm::vec3 n = vertices.normals[i];
+      if (!std::isfinite(n.x) || !std::isfinite(n.y) || !std::isfinite(n.z)) {
+        fail(path_, "normal " + std::to_string(i) + " is not finite");
+      }
+    }
+  }
+
+  void set_uvs(const gltf::Numbers& numbers, Vertices& vertices) const {
+    for (std::size_t i = 0; i < numbers.count; ++i) {
+      // glTF counts v downwards
+      const glm::vec2 uv(numbers.values[2 * i], 1.0F - numbers.values[2 * i + 1]);
+      if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) {
+        fail(path_, "texture coordinate " + std::to_string(i) + " is not finite");
+      }
+      vertices.uvs.push_back(uv);
+    }
+  }
+
+  void set_colors(const gltf::Numbers& numbers, Vertices& vertices) const {
+    set_rows(numbers, vertices.colors);
+    for (glm::vec3& color : vertices.colors) {
+      for (int c = 0; c < 3; ++c) {
+        if (!std::isfinite(color[c])) fail(path_, "a vertex colour is not finite");
+        color[c] = std::clamp(color[c], 0.0F, 1.0F);
+      }
     }
   }
 
@@ -127,62 +257,13 @@ class GltfBuilder {
     return triangles_of(path_, primitive.mode, indices);
   }
 
-  void check_count(const gltf::Numbers& numbers, std::size_t vertex_count, const char* what) const {
-    if (numbers.count == vertex_count) return;
-    fail(path_, std::string("number of ") + what + " is " + std::to_string(numbers.count) +
-                    ", expected one for each of " + std::to_string(vertex_count) + " vertices");
-  }
-
-  void add_normals(const tinygltf::Primitive& primitive, std::size_t vertex_count,
-                   const glm::dmat4& world_from_node) {
-    TriangleMesh& mesh = loaded_.mesh;
-    const int accessor = attribute(primitive, "NORMAL");
-    mesh.normals.resize(mesh.positions.size(), glm::vec3(0.0F));
-    if (accessor < 0) return;
-    const gltf::Numbers normals = gltf::read_numbers(path_, model_, accessor, TINYGLTF_TYPE_VEC3, "normal");
-    check_count(normals, vertex_count, "normals");
-    // Normals follow the cofactors, which, unlike the inverse, exist for flat transforms too.
-    const glm::dmat3 m(world_from_node);
-    const double sign = glm::determinant(m) < 0.0 ? -1.0 : 1.0;
-    const glm::dmat3 cofactors(sign * glm::cross(m[1], m[2]), sign * glm::cross(m[2], m[0]),
-                               sign * glm::cross(m[0], m[1]));
-    const std::size_t first = mesh.positions.size() - vertex_count;
-    for (std::size_t i = 0; i < vertex_count; ++i) {
-      const float* n = normals.values.data() + 3 * i;
-      if (!std::isfinite(n[0]) || !std::isfinite(n[1]) || !std::isfinite(n[2])) {
-        fail(path_, "normal " + std::to_string(i) + " is not finite");
-      }
-      const glm::dvec3 turned = cofactors * glm::dvec3(n[0], n[1], n[2]);
-      const double length = glm::length(turned);
-      mesh.normals[first + i] = length > 0.0 ? glm::vec3(turned / length) : glm::vec3(0.0F);
-    }
-  }
-
-  void add_uvs(const tinygltf::Primitive& primitive, std::size_t vertex_count) {
-    TriangleMesh& mesh = loaded_.mesh;
-    const int accessor = attribute(primitive, "TEXCOORD_" + std::to_string(uv_set_(primitive.material)));
-    mesh.uvs.resize(mesh.positions.size(), glm::vec2(0.0F));
-    if (accessor < 0) return;
-    const gltf::Numbers uvs =
-        gltf::read_numbers(path_, model_, accessor, TINYGLTF_TYPE_VEC2, "texture coordinate");
-    check_count(uvs, vertex_count, "texture coordinates");
-    has_uvs_ = true;
-    const std::size_t first = mesh.positions.size() - vertex_count;
-    for (std::size_t i = 0; i < vertex_count; ++i) {
-      const glm::vec2 uv(uvs.values[2 * i], 1.0F - uvs.values[2 * i + 1]);  // glTF counts v downwards
-      if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) {
-        fail(path_, "texture coordinate " + std::to_string(i) + " is not finite");
-      }
-      mesh.uvs[first + i] = uv;
-    }
-  }
-
   const std::string& path_;
   const tinygltf::Model& model_;
   const MeshLimits& limits_;
   const gltf::UvSetOfMaterial& uv_set_;
   LoadedMesh loaded_;
   bool has_uvs_ = false;
+  bool has_colors_ = false;
 };
 
 }  // namespace

@@ -86,7 +86,6 @@ class GltfScene {
   void warn_of_what_is_lost(const tinygltf::Mesh& mesh) {
     for (const tinygltf::Primitive& primitive : mesh.primitives) {
       if (!primitive.targets.empty()) warnings_.add("morph targets are not supported");
-      if (primitive.attributes.contains("COLOR_0")) warnings_.add("vertex colours are not supported");
       if (primitive.mode >= TINYGLTF_MODE_POINTS && primitive.mode <= TINYGLTF_MODE_LINE_STRIP) {
         warnings_.add("points and lines are not supported");
       }
@@ -143,9 +142,13 @@ class GltfScene {
     } else if (light.type == "spot") {
       const double inner = light.spot.innerConeAngle;
       const double outer = light.spot.outerConeAngle;
-      if (!(inner >= 0.0 && inner < outer && outer <= 0.5 * std::numbers::pi + 1e-6)) {
+      if (!(inner >= 0.0 && std::isfinite(inner) && outer > 0.0 && std::isfinite(outer))) {
         fail(path_, where + "cone angles are " + text_of(inner) + " and " + text_of(outer) +
                         ", expected 0 ≤ inner < outer ≤ π/2");
+      }
+      // Exporters round both, and write a sharp edge as equal angles.
+      if (inner > outer || outer > 0.5 * std::numbers::pi + 1e-6) {
+        warnings_.add("cone angles of spot lights that are out of order are cut to 0 ≤ inner ≤ outer ≤ π/2");
       }
       const float outer_degrees = std::min(degrees(outer), 90.0F);
       scene.spot_lights.push_back(

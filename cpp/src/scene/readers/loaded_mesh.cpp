@@ -20,23 +20,25 @@ glm::dvec3 facet_cross(const std::vector<glm::vec3>& positions, glm::uvec3 t) {
   return glm::cross(glm::dvec3(positions[t.y]) - a, glm::dvec3(positions[t.z]) - a);
 }
 
-// Number of each vertex's place, counted from 0 in an order that only depends on the positions.
-std::vector<std::uint32_t> weld_positions(const std::vector<glm::vec3>& positions, std::size_t first) {
+// Number of each vertex's place, counted from 0 in an order that only depends on the positions and `smoothing`.
+std::vector<std::uint32_t> weld_positions(const std::vector<glm::vec3>& positions,
+                                          std::span<const std::uint64_t> smoothing) {
   const auto before = [&](std::uint32_t a, std::uint32_t b) {
     const glm::vec3 p = positions[a];
     const glm::vec3 q = positions[b];
     if (p.x != q.x) return p.x < q.x;
     if (p.y != q.y) return p.y < q.y;
-    return p.z < q.z;
+    if (p.z != q.z) return p.z < q.z;
+    return !smoothing.empty() && smoothing[a] < smoothing[b];
   };
-  std::vector<std::uint32_t> order(positions.size() - first);
-  std::iota(order.begin(), order.end(), static_cast<std::uint32_t>(first));
+  std::vector<std::uint32_t> order(positions.size());
+  std::iota(order.begin(), order.end(), 0U);
   std::sort(order.begin(), order.end(), before);
   std::vector<std::uint32_t> place(order.size());
   std::uint32_t current = 0;
   for (std::size_t i = 0; i < order.size(); ++i) {
     if (i > 0 && before(order[i - 1], order[i])) ++current;
-    place[order[i] - first] = current;
+    place[order[i]] = current;
   }
   return place;
 }
@@ -69,10 +71,10 @@ void check_limits(const std::string& path, std::uint64_t vertices, std::uint64_t
   }
 }
 
-void complete_normals(TriangleMesh& mesh, std::size_t first_vertex, std::size_t first_triangle) {
+void complete_normals(TriangleMesh& mesh, std::span<const std::uint64_t> smoothing) {
   mesh.normals.resize(mesh.positions.size(), glm::vec3(0.0F));
   bool is_complete = true;
-  for (std::size_t i = first_vertex; i < mesh.normals.size(); ++i) {
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
     const float length = glm::length(mesh.normals[i]);
     if (length >= kMissingNormal && std::isfinite(length)) {
       mesh.normals[i] /= length;
@@ -83,10 +85,9 @@ void complete_normals(TriangleMesh& mesh, std::size_t first_vertex, std::size_t 
   }
   if (is_complete) return;
 
-  const std::vector<std::uint32_t> place = weld_positions(mesh.positions, first_vertex);
+  const std::vector<std::uint32_t> place = weld_positions(mesh.positions, smoothing);
   std::vector<glm::dvec3> sums(place.size(), glm::dvec3(0.0));
-  for (std::size_t i = first_triangle; i < mesh.triangles.size(); ++i) {
-    const glm::uvec3 t = mesh.triangles[i];
+  for (const glm::uvec3 t : mesh.triangles) {
     const glm::dvec3 cross = facet_cross(mesh.positions, t);
     const double length = glm::length(cross);
     if (!(length > 0.0)) continue;
@@ -94,12 +95,12 @@ void complete_normals(TriangleMesh& mesh, std::size_t first_vertex, std::size_t 
       const glm::dvec3 p(mesh.positions[t[k]]);
       const glm::dvec3 a = glm::dvec3(mesh.positions[t[(k + 1) % 3]]) - p;
       const glm::dvec3 b = glm::dvec3(mesh.positions[t[(k + 2) % 3]]) - p;
-      sums[place[t[k] - first_vertex]] += std::atan2(length, glm::dot(a, b)) / length * cross;
+      sums[place[t[k]]] += std::atan2(length, glm::dot(a, b)) / length * cross;
     }
   }
-  for (std::size_t i = first_vertex; i < mesh.normals.size(); ++i) {
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
     if (mesh.normals[i] != glm::vec3(0.0F)) continue;
-    const glm::dvec3 sum = sums[place[i - first_vertex]];
+    const glm::dvec3 sum = sums[place[i]];
     const double length = glm::length(sum);
     // Facets that cancel out, or none: any unit vector will do.
     mesh.normals[i] = length > 1e-12 ? glm::vec3(sum / length) : glm::vec3(0.0F, 1.0F, 0.0F);
@@ -133,11 +134,13 @@ void drop_degenerate(const std::string& path, LoadedMesh& loaded) {
     mesh.positions[next] = mesh.positions[i];
     if (!mesh.normals.empty()) mesh.normals[next] = mesh.normals[i];
     if (!mesh.uvs.empty()) mesh.uvs[next] = mesh.uvs[i];
+    if (!mesh.colors.empty()) mesh.colors[next] = mesh.colors[i];
     new_index[i] = next++;
   }
   mesh.positions.resize(next);
   if (!mesh.normals.empty()) mesh.normals.resize(next);
   if (!mesh.uvs.empty()) mesh.uvs.resize(next);
+  if (!mesh.colors.empty()) mesh.colors.resize(next);
   for (glm::uvec3& t : mesh.triangles) t = {new_index[t.x], new_index[t.y], new_index[t.z]};
 }
 

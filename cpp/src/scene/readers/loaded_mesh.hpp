@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,12 +27,16 @@ struct LoadedMesh {
 };
 
 /// What an OBJ file says besides its triangles.
-struct ObjMaterials {
-  std::vector<std::string> names;      ///< of the materials that its groups use, by number
+struct ObjContent {
+  std::vector<std::string> materials;  ///< names of those that its groups use, by number
   std::vector<std::string> libraries;  ///< what follows each `mtllib`
+  std::uint64_t lines = 0;
+  std::uint64_t points = 0;
+  std::uint64_t curves = 0;  ///< and surfaces
+  std::uint64_t colors = 0;  ///< vertices that have one
 };
 
-LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjMaterials* materials = nullptr);
+LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjContent* content = nullptr);
 LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits);
 
 /// Extension of a file name in lower case, with its dot.
@@ -44,11 +49,11 @@ void check_positions(const std::string& path, const std::vector<glm::vec3>& posi
 void check_limits(const std::string& path, std::uint64_t vertices, std::uint64_t triangles,
                   const MeshLimits& limits);
 
-/// Gives every vertex from `first_vertex` on whose normal is missing (shorter than 1e-6) the mean of the facet normals
-/// around it, weighted with the angle of the facet (Thürmer and Wüthrich, "Computing vertex normals from polygonal
-/// facets", JGT 3(1), 1998). Vertices at the same place count as one: files often split them for texture
-/// coordinates. Others are normalised.
-void complete_normals(TriangleMesh& mesh, std::size_t first_vertex = 0, std::size_t first_triangle = 0);
+/// Gives every vertex whose normal is missing (shorter than 1e-6) the mean of the facet normals around it, weighted with the
+/// angle of the facet (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", JGT 3(1), 1998). Vertices at
+/// the same place count as one (files often split them for texture coordinates) if their entries of `smoothing`, one per
+/// vertex or none at all, are equal. Others are normalised.
+void complete_normals(TriangleMesh& mesh, std::span<const std::uint64_t> smoothing = {});
 
 /// Drops triangles without area and then vertices that no triangle uses. Throws FileError if nothing remains.
 void drop_degenerate(const std::string& path, LoadedMesh& loaded);

@@ -5,8 +5,11 @@
 #include <charconv>
 #include <cmath>
 
+#include <glm/common.hpp>
+
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
+#include "text_lines.hpp"
 
 namespace mirrorbake::mtl {
 namespace {
@@ -27,15 +30,39 @@ std::optional<float> number(std::string_view token) {
   return value;
 }
 
+// Thrown for a line that says nothing; never leaves parse().
+struct Unusable {
+  std::string problem;
+};
+
+// Linear Rec. 709 from CIE XYZ (IEC 61966-2-1).
+glm::vec3 rec709_from_xyz(glm::vec3 v) {
+  return glm::max(glm::vec3(3.2406F * v.x - 1.5372F * v.y - 0.4986F * v.z,
+                            -0.9689F * v.x + 1.8758F * v.y + 0.0415F * v.z,
+                            0.0557F * v.x - 0.2040F * v.y + 1.0570F * v.z),
+                  0.0F);
+}
+
+// Where options begin that follow the name of a file, which may have spaces and dashes itself.
+std::size_t options_after(std::string_view text) {
+  constexpr std::array<std::string_view, 11> kOptions = {"-o",      "-s",     "-t",  "-mm", "-clamp",  "-blendu",
+                                                         "-blendv", "-boost", "-bm", "-texres", "-imfchan"};
+  for (std::size_t at = text.find_first_of(kSpace); at != std::string_view::npos;
+       at = text.find_first_of(kSpace, at + 1)) {
+    const std::string_view token = split_keyword(text.substr(at)).first;
+    if (std::find(kOptions.begin(), kOptions.end(), token) != kOptions.end()) return at;
+  }
+  return text.size();
+}
+
 // One line, of which the keyword has been read.
 class Line {
  public:
-  Line(const std::string& path, std::size_t line_number, std::string_view keyword, std::string_view rest)
-      : path_(path), number_(line_number), keyword_(keyword), rest_(rest) {}
+  Line(std::string_view keyword, std::string_view rest) : keyword_(keyword), rest_(rest) {}
 
   [[noreturn]] void fail(const std::string& expected) const {
-    throw FileError(path_, "line " + std::to_string(number_) + ": " + std::string(keyword_.substr(0, 40)) +
-                               " '" + std::string(rest_.substr(0, 40)) + "', expected " + expected);
+    throw Unusable{std::string(keyword_.substr(0, 40)) + " '" + std::string(rest_.substr(0, 40)) + "', expected " +
+                   expected};
   }
 
   std::string_view rest() const { return rest_; }
@@ -46,16 +73,21 @@ class Line {
     return *value;
   }
 
-  float fraction() const {
-    const std::optional<float> value = number(rest_);
-    if (!value || !(*value >= 0.0F && *value <= 1.0F)) fail("one number from 0 to 1");
-    return *value;
+  // One number, or the mean of three, cut to [0, 1].
+  float fraction(Warnings& warnings) const {
+    const glm::vec3 value = colour();
+    const float mean = (value.x + value.y + value.z) / 3.0F;
+    if (mean <= 1.0F) return mean;
+    warnings.add("MTL " + std::string(keyword_.substr(0, 40)) + ": values above 1 are taken as 1");
+    return 1.0F;
   }
 
   // Three numbers, or one for all three.
   glm::vec3 colour() const {
     glm::vec3 value(0.0F);
     std::string_view left = rest_;
+    const bool is_xyz = split_keyword(left).first == "xyz";
+    if (is_xyz) left = split_keyword(left).second;
     for (int i = 0; i < 3; ++i) {
       const auto [token, rest] = split_keyword(left);
       if (i == 1 && token.empty()) return glm::vec3(value.x);
@@ -64,16 +96,23 @@ class Line {
       value[i] = *component;
       left = rest;
     }
-    return value;
+    return is_xyz ? rec709_from_xyz(value) : value;
   }
 
-  // Options, then the name of a file, which may have spaces.
+  // The name of a file, which may have spaces, with options before or after it.
   Map map(Warnings& warnings) const {
     Map map;
     std::array<float, 3> offset{0.0F, 0.0F, 0.0F};
     std::array<float, 3> scale{1.0F, 1.0F, 1.0F};
     std::string_view left = rest_;
-    while (left.starts_with('-')) {
+    while (!left.empty()) {
+      if (!left.starts_with('-')) {
+        if (!map.file.empty()) break;
+        const std::size_t end = options_after(left);
+        map.file = trimmed(left.substr(0, end));
+        left = trimmed(left.substr(end));
+        continue;
+      }
       const auto [option, rest] = split_keyword(left);
       left = rest;
       if (option == "-o" || option == "-s" || option == "-t") {
@@ -103,8 +142,7 @@ class Line {
         warnings.add("MTL map option " + std::string(option.substr(0, 40)) + " is not supported");
       }
     }
-    if (left.empty()) fail("the name of an image");
-    map.file = left;
+    if (map.file.empty()) fail("the name of an image");
     std::replace(map.file.begin(), map.file.end(), '\\', '/');
     // MTL's v points up, that of the transform down: 1 − (s·v + o) = s·(1 − v) + (1 − s − o).
     map.transform.scale = {scale[0], scale[1]};
@@ -113,8 +151,6 @@ class Line {
   }
 
  private:
-  const std::string& path_;
-  std::size_t number_;
   std::string_view keyword_;
   std::string_view rest_;
 };
@@ -129,8 +165,9 @@ void read_line(const Line& line, std::string_view keyword, Definition& material,
   } else if (keyword == "Ns") {
     material.exponent = line.one_number();
   } else if (keyword == "Ni") {
-    material.index = line.one_number();
-    if (!(*material.index > 0.0F)) line.fail("a refractive index above 0");
+    const float index = line.one_number();
+    if (!(index > 0.0F)) line.fail("a refractive index above 0");
+    material.index = index;
   } else if (keyword == "illum") {
     const float value = line.one_number();
     if (!(value >= 0.0F && value <= 10.0F)) line.fail("0 to 10");
@@ -144,9 +181,9 @@ void read_line(const Line& line, std::string_view keyword, Definition& material,
   } else if (keyword == "map_d") {
     material.dissolve_map = line.map(warnings);
   } else if (keyword == "d") {
-    material.dissolve = line.fraction();
+    material.dissolve = line.fraction(warnings);
   } else if (keyword == "Tr") {
-    material.transparency = line.fraction();
+    material.transparency = line.fraction(warnings);
   } else if (keyword != "Ka" && keyword != "map_Ka" && keyword != "Tf" && keyword != "sharpness") {
     warnings.add("MTL keyword " + std::string(keyword.substr(0, 40)) + " is not supported");
   }
@@ -160,23 +197,24 @@ std::pair<std::string_view, std::string_view> split_keyword(std::string_view lin
   return {line.substr(0, end), trimmed(line.substr(end))};
 }
 
-std::vector<Definition> parse(const std::string& path, std::string_view text, Warnings& warnings) {
+std::vector<Definition> parse(std::string_view text, Warnings& warnings) {
   std::vector<Definition> materials;
-  std::size_t line_number = 0;
-  while (!text.empty()) {
-    ++line_number;
-    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
-    const auto [keyword, rest] = split_keyword(text.substr(0, end));
-    text.remove_prefix(std::min(end + (text.substr(end, 2) == "\r\n" ? 2 : 1), text.size()));
+  TextLines lines(text);
+  while (lines.next()) {
+    const auto [keyword, rest] = split_keyword(lines.line());
     if (keyword.empty() || keyword.starts_with('#')) continue;
-    const Line line(path, line_number, keyword, rest);
-    if (keyword == "newmtl") {
-      materials.emplace_back();
-      materials.back().name = rest;
-    } else if (materials.empty()) {
-      line.fail("newmtl first");
-    } else {
-      read_line(line, keyword, materials.back(), warnings);
+    const Line line(keyword, rest);
+    try {
+      if (keyword == "newmtl") {
+        materials.emplace_back();
+        materials.back().name = rest;
+      } else if (materials.empty()) {
+        line.fail("newmtl first");
+      } else {
+        read_line(line, keyword, materials.back(), warnings);
+      }
+    } catch (const Unusable& unusable) {
+      warnings.add("MTL: ignored " + unusable.problem);
     }
   }
   return materials;

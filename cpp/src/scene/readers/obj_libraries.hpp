@@ -11,7 +11,7 @@ namespace mirrorbake {
 std::vector<std::string> material_libraries(std::string_view text);
 
 /// The files that `names` after an `mtllib` stand for: one whose name has spaces, if the OBJ file `path` has it beside it,
-/// or several.
-std::vector<std::string> library_files(const std::string& path, const std::string& names);
+/// or several. "\\" between folders becomes "/".
+std::vector<std::string> library_files(const std::string& path, std::string names);
 
 }  // namespace mirrorbake

@@ -26,9 +26,12 @@ class ObjScene {
       : path_(path), options_(options), textures_(options, warnings_) {}
 
   LoadedScene read() {
-    ObjMaterials used;
+    ObjContent used;
     LoadedMesh mesh = read_obj(path_, options_.meshes, &used);
     drop_degenerate(path_, mesh);
+    warnings_.add("lines are not supported", used.lines);
+    warnings_.add("points are not supported", used.points);
+    warnings_.add("curves and surfaces are not supported", used.curves);
     for (const std::string& library : used.libraries) read_library(library);
 
     std::map<int, int> material_of;
@@ -36,7 +39,7 @@ class ObjScene {
       if (material_of.contains(group.material)) continue;
       material_of[group.material] = static_cast<int>(loaded_.scene.materials.size());
       loaded_.scene.materials.push_back(
-          group.material < 0 ? unnamed() : material(used.names[static_cast<std::size_t>(group.material)]));
+          group.material < 0 ? unnamed() : material(used.materials[static_cast<std::size_t>(group.material)]));
     }
     loaded_.scene.objects = split_into_objects(std::move(mesh), loaded_.scene.materials, material_of);
     loaded_.warnings = warnings_.take();
@@ -55,26 +58,28 @@ class ObjScene {
     return material;
   }
 
-  fs::path resolved(const fs::path& from, const std::string& reference) const {
+  // The file that a reference means, if it can be read. What is outside of the file's own directory never is.
+  std::optional<fs::path> existing(const fs::path& from, const std::string& what, const std::string& reference) {
+    std::error_code code;
     const auto target = resolve_inside(from.parent_path(), reference);
     if (!target) {
-      throw FileError(from.string(),
-                      "refers to '" + reference + "', which is not inside the file's own directory");
+      warnings_.add("the " + what + " '" + reference + "' is not inside the file's own directory");
+      return std::nullopt;
     }
-    return *target;
+    if (!fs::exists(*target, code)) {
+      warnings_.add("the " + what + " '" + reference + "' does not exist");
+      return std::nullopt;
+    }
+    return target;
   }
 
   void read_library(const std::string& names) {
-    std::error_code code;
     for (const std::string& file : library_files(path_, names)) {
-      const fs::path library = resolved(path_, file);
-      if (!fs::exists(library, code)) {
-        warnings_.add("the material library '" + file + "' does not exist");
-        continue;
-      }
-      if (!libraries_.insert(library).second) continue;
+      const auto found = existing(path_, "material library", file);
+      if (!found || !libraries_.insert(*found).second) continue;
+      const fs::path library = *found;
       const std::string text = read_file(library);
-      for (mtl::Definition& definition : mtl::parse(library.string(), text, warnings_)) {
+      for (mtl::Definition& definition : mtl::parse(text, warnings_)) {
         const std::string name = definition.name;
         definitions_.emplace(name, Defined{std::move(definition), library});
       }
@@ -105,8 +110,9 @@ class ObjScene {
 
   void add_map(const fs::path& library, const mtl::Map& map, TextureReference& reference,
                float* largest = nullptr) {
-    if (map.file.empty()) return;
-    const fs::path file = resolved(library, map.file);
+    const auto found = map.file.empty() ? std::nullopt : existing(library, "image", map.file);
+    if (!found) return;
+    const fs::path file = *found;
     const auto key = std::tuple(file, map.wrap, largest != nullptr);
     const auto it = texture_of_.find(key);
     if (it != texture_of_.end()) {
@@ -125,8 +131,9 @@ class ObjScene {
   }
 
   void add_opacity(const fs::path& library, const mtl::Map& map, TextureReference& reference) {
-    if (map.file.empty()) return;
-    const fs::path file = resolved(library, map.file);
+    const auto found = map.file.empty() ? std::nullopt : existing(library, "image", map.file);
+    if (!found) return;
+    const fs::path file = *found;
     const auto [it, is_new] = opacity_of_.try_emplace(std::pair(file, map.wrap), -1);
     if (is_new) {
       const std::string bytes = read_file(file.string());

@@ -60,7 +60,7 @@ std::vector<std::string> referenced_files(const std::string& path, FileContent c
       std::error_code code;
       if (!library || !fs::is_regular_file(*library, code)) continue;
       Warnings ignored;
-      for (const mtl::Definition& d : mtl::parse(library->string(), read_file(*library), ignored)) {
+      for (const mtl::Definition& d : mtl::parse(read_file(*library), ignored)) {
         for (const mtl::Map* map : {&d.diffuse_map, &d.specular_map, &d.emission_map, &d.dissolve_map}) {
           if (!map->file.empty()) references.add(library->parent_path(), map->file);
         }

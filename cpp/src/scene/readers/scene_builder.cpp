@@ -50,6 +50,7 @@ TriangleMesh submesh(const TriangleMesh& mesh, const std::vector<Range>& ranges,
     result.positions.push_back(mesh.positions[vertex]);
     if (!mesh.normals.empty()) result.normals.push_back(mesh.normals[vertex]);
     if (!mesh.uvs.empty()) result.uvs.push_back(mesh.uvs[vertex]);
+    if (!mesh.colors.empty()) result.colors.push_back(mesh.colors[vertex]);
     new_index[vertex] = kUnused;
   }
   return result;
@@ -57,12 +58,13 @@ TriangleMesh submesh(const TriangleMesh& mesh, const std::vector<Range>& ranges,
 
 }  // namespace
 
-void Warnings::add(const std::string& message) {
+void Warnings::add(const std::string& message, std::uint64_t count) {
+  if (count == 0) return;
   const auto [it, is_new] = index_.emplace(message, warnings_.size());
   if (is_new) {
-    warnings_.push_back({valid_utf8(message), 1});
+    warnings_.push_back({valid_utf8(message), count});
   } else {
-    ++warnings_[it->second].count;
+    warnings_[it->second].count += count;
   }
 }
 

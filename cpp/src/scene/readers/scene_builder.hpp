@@ -19,7 +19,7 @@ namespace mirrorbake {
 /// Counts what a scene does not show.
 class Warnings {
  public:
-  void add(const std::string& message);
+  void add(const std::string& message, std::uint64_t count = 1);
   std::vector<SceneWarning> take() { return std::move(warnings_); }
 
  private:

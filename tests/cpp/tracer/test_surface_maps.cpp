@@ -1,0 +1,81 @@
+// What textures and colours of the mesh do to a surface.
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+
+#include "mirrorbake/scene/scene.hpp"
+#include "mirrorbake/scene/shapes.hpp"
+#include "mirrorbake/tracer/tracer.hpp"
+
+namespace mirrorbake {
+namespace {
+
+// A plate of 2 m in the plane y = 0, u along +X and v along −Z, seen from above.
+struct Plate {
+  Scene scene;
+  Camera camera;
+  Plate() {
+    Material material;
+    material.specular = true;
+    material.fresnel.r0 = glm::vec3(0.5F);
+    material.fresnel.model = FresnelModel::constant;
+    scene.materials.push_back(material);
+    scene.objects.push_back({"plate", make_rectangle({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}), 0, {}});
+    camera.eye = {0.0F, 3.0F, 0.5F};
+    camera.width = camera.height = 16;
+  }
+  glm::vec3 mean_normal() const {
+    const LayerTrace trace = Tracer(scene, {.indirect = IndirectLight::none}).trace_layers(camera, 0, {});
+    EXPECT_GT(trace.samples.size(), 100U);
+    glm::vec3 sum(0.0F);
+    for (const glm::vec3 n : trace.samples.normal) sum += n;
+    return glm::normalize(sum);
+  }
+};
+
+// glTF 2.0 §3.9.3: red is the tangent, along u, green the bitangent, along v as it points up in the texture.
+TEST(SurfaceMaps, ANormalTextureTiltsTheNormalAlongTheTextureCoordinates) {
+  Plate plate;
+  const glm::vec3 tilt = glm::normalize(glm::vec3(0.3F, 0.2F, 1.0F));
+  Texture texture;
+  texture.image = Image(1, 1, {"R", "G", "B"});
+  for (int c = 0; c < 3; ++c) texture.image.pixels[static_cast<std::size_t>(c)] = 0.5F * tilt[c] + 0.5F;
+  plate.scene.textures.push_back(texture);
+  Material& material = plate.scene.materials[0];
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-5F);
+  material.normal_texture.texture = 0;
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(tilt.x, tilt.z, -tilt.y)), 1e-5F);
+  // Coordinates that run the other way turn the tangent with them, not the bitangent.
+  for (glm::vec2& uv : plate.scene.objects[0].mesh.uvs) uv.x = -uv.x;
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(-tilt.x, tilt.z, -tilt.y)), 1e-5F);
+  material.normal_scale = 0.0F;
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-5F);
+  material.normal_scale = 1.0F;
+  plate.scene.objects[0].mesh.uvs.clear();
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-5F);
+}
+
+TEST(SurfaceMaps, ColoursOfTheMeshMultiplyAlbedoAndOfMetalsTheReflectance) {
+  Plate plate;
+  Material& material = plate.scene.materials[0];
+  material.albedo = glm::vec3(0.5F);
+  plate.scene.directional_lights.push_back({{0, -1, 0}, glm::vec3(1.0F)});
+  const auto mean = [&](const auto& value) {
+    const LayerTrace trace =
+        Tracer(plate.scene, {.indirect = IndirectLight::none}).trace_layers(plate.camera, 0, {});
+    return value(trace, trace.samples.size() / 2);
+  };
+  const auto fresnel = [](const LayerTrace& t, std::size_t i) { return t.samples.fresnel[i]; };
+  const auto diffuse = [](const LayerTrace& t, std::size_t i) { return t.sample_beauty[i]; };
+  const glm::vec3 white_fresnel = mean(fresnel);
+  const glm::vec3 white_diffuse = mean(diffuse);
+  const glm::vec3 color(1.0F, 0.5F, 0.25F);
+  plate.scene.objects[0].mesh.colors.assign(plate.scene.objects[0].mesh.positions.size(), color);
+  EXPECT_EQ(mean(fresnel), white_fresnel);
+  EXPECT_LT(glm::length(mean(diffuse) - color * white_diffuse), 1e-6F);
+  material.colors_tint_reflectance = true;
+  EXPECT_LT(glm::length(mean(fresnel) - color * white_fresnel), 1e-6F);
+}
+
+}  // namespace
+}  // namespace mirrorbake

@@ -454,7 +454,7 @@ class SpecularLobe(enum.Enum):
 class Material:
     """What a surface does with light."""
 
-    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: TextureReference = ..., specular: bool = False, fresnel: Fresnel = ..., specular_texture: TextureReference = ..., lobe: SpecularLobe = SpecularLobe.mirror, roughness: float = 0.10000000149011612, roughness_texture: TextureReference = ..., exponent: float = 100.0, layers: LayerModel = LayerModel.additive, emission: Sequence[float] = (0.0, 0.0, 0.0), emission_texture: TextureReference = ..., opacity: float = 1.0, opacity_texture: TextureReference = ..., opacity_cutoff: float | None = None) -> None: ...
+    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: TextureReference = ..., specular: bool = False, fresnel: Fresnel = ..., specular_texture: TextureReference = ..., lobe: SpecularLobe = SpecularLobe.mirror, roughness: float = 0.10000000149011612, roughness_texture: TextureReference = ..., exponent: float = 100.0, layers: LayerModel = LayerModel.additive, emission: Sequence[float] = (0.0, 0.0, 0.0), emission_texture: TextureReference = ..., opacity: float = 1.0, opacity_texture: TextureReference = ..., opacity_cutoff: float | None = None, normal_texture: TextureReference = ..., normal_scale: float = 1.0, colors_tint_reflectance: bool = False) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -568,15 +568,39 @@ class Material:
     @opacity_cutoff.setter
     def opacity_cutoff(self, arg: float | None, /) -> None: ...
 
+    @property
+    def normal_texture(self) -> TextureReference:
+        """
+        bends the normal: texels (x, y, z)/2 + 1/2 along ∂p/∂u, ∂p/∂v (v up) and the normal
+        """
+
+    @normal_texture.setter
+    def normal_texture(self, arg: TextureReference, /) -> None: ...
+
+    @property
+    def normal_scale(self) -> float:
+        """of the x and y of `normal_texture`"""
+
+    @normal_scale.setter
+    def normal_scale(self, arg: float, /) -> None: ...
+
+    @property
+    def colors_tint_reflectance(self) -> bool:
+        """the mesh's colours multiply `fresnel.r0`, too: of a metal"""
+
+    @colors_tint_reflectance.setter
+    def colors_tint_reflectance(self, arg: bool, /) -> None: ...
+
 class TriangleMesh:
     """
     Triangles with optional vertex normals, texture coordinates and parts. World space, metres.
     """
 
-    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, parts: Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None:
+    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, parts: Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, colors: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None) -> None:
         """
         Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from outside, unit
-        normals (V, 3) (default: flat shading), uvs (V, 2) with v up, and the part of each triangle (T,). Raises
+        normals (V, 3) (default: flat shading), uvs (V, 2) with v up, the part of each triangle (T,), and colours
+        (V, 3) in [0, 1], linear, that multiply the material's albedo. Raises
         InvalidArgument for anything not finite, indices out of range or a mesh without area.
         """
 
@@ -599,6 +623,10 @@ class TriangleMesh:
     @property
     def parts(self) -> Annotated[NDArray[numpy.uint16], dict(writable=False)]:
         """Part of each triangle, (T,), or (0,) if all belong to part 0."""
+
+    @property
+    def colors(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """Colours of the vertices, (V, 3), linear, or (0, 3) if they have none."""
 
     def __repr__(self) -> str: ...
 

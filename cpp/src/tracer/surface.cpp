@@ -37,8 +37,8 @@ glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
 
 // The shading normal bent by a texture (glTF 2.0 §3.9.3). The tangents are those of the triangle's plane, made upright to the
 // normal that is interpolated over it.
-glm::vec3 mapped_normal(const Scene& scene, const Material& material, const TriangleMesh& mesh, const Surface& s,
-                        const std::array<glm::vec3, 3>& corners) {
+glm::vec3 mapped_normal(const Scene& scene, const Material& material, const TriangleMesh& mesh,
+                        const Surface& s, const std::array<glm::vec3, 3>& corners) {
   if (mesh.uvs.empty()) return s.normal;
   const glm::uvec3 t = mesh.triangles[s.triangle];
   const glm::vec2 du = mesh.uvs[t.y] - mesh.uvs[t.x];
@@ -55,7 +55,8 @@ glm::vec3 mapped_normal(const Scene& scene, const Material& material, const Tria
   const glm::vec3 bitangent = glm::cross(s.normal, tangent) * std::copysign(1.0F, determinant);
   const glm::vec3 texel =
       texture_lookup(scene, material.normal_texture, uv_at(mesh, s.triangle, s.barycentric)) * 2.0F - 1.0F;
-  const glm::vec3 bent = material.normal_scale * (texel.x * tangent + texel.y * bitangent) + texel.z * s.normal;
+  const glm::vec3 bent =
+      material.normal_scale * (texel.x * tangent + texel.y * bitangent) + texel.z * s.normal;
   const float size = glm::length(bent);
   // One that leaves the triangle's front is a defect of the texture.
   return size > 1e-6F && glm::dot(bent, s.geometric_normal) > 0.0F ? bent / size : s.normal;

@@ -93,7 +93,7 @@ TEST_F(GltfSceneFile, HasOneObjectPerNodeAndMaterialWithUniqueNames) {
   EXPECT_THAT(names, ElementsAre("chair/blue", "chair/red", "table", "other", "table#2"));
   ASSERT_EQ(scene.materials.size(), 2U);
   EXPECT_EQ(scene.materials[static_cast<std::size_t>(scene.objects[0].material)].name, "blue");
-  EXPECT_EQ(scene.objects[0].mesh.triangles.size(), 4U);  // two primitives of one material
+  EXPECT_EQ(scene.objects[0].mesh.triangles.size(), 4U);   // two primitives of one material
   EXPECT_EQ(scene.objects[0].mesh.positions.size(), 12U);  // without normals, facets share no vertices
   EXPECT_EQ(scene.objects[2].mesh.positions[2], glm::vec3(1, 1, 5));
   EXPECT_EQ(scene.objects[4].mesh.positions[2], glm::vec3(2, 2, 0));
@@ -454,7 +454,8 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
       {"type is 'laser'", light("", R"({"type":"laser"})")},
       {"intensity is (-", light("", R"({"type":"point","intensity":-1})")},
       {"color is not three numbers", light("", R"({"type":"point","color":[1,1]})")},
-      {"cone angles are", light("", R"({"type":"spot","spot":{"innerConeAngle":-0.1,"outerConeAngle":0.6}})")},
+      {"cone angles are",
+       light("", R"({"type":"spot","spot":{"innerConeAngle":-0.1,"outerConeAngle":0.6}})")},
       {"cone angles are", light("", R"({"type":"spot","spot":{"outerConeAngle":0}})")},
       {"has no direction", light(R"("scale":[0,0,0],)", R"({"type":"directional"})")},
       {"beyond 1e12", light(R"("translation":[1e13,0,0],)", R"({"type":"point"})")},

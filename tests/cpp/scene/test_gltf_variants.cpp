@@ -31,16 +31,19 @@ class GltfVariants : public testing::FileTest {
   LoadedScene load(const Document& document) const { return load(document.json()); }
 
   // A document of one mesh, whose accessors, views and buffer are given.
-  static std::string document(const std::string& primitive, const std::string& accessors, const std::string& views,
-                              const std::string& buffer, const std::string& more_buffers = "",
-                              const std::string& extra = "") {
+  static std::string document(const std::string& primitive, const std::string& accessors,
+                              const std::string& views, const std::string& buffer,
+                              const std::string& more_buffers = "", const std::string& extra = "") {
     return R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)" + extra +
-           R"("meshes":[{"primitives":[)" + primitive + R"(]}],"accessors":[)" + accessors + R"(],"bufferViews":[)" + views +
-           R"(],"buffers":[{"uri":"data:application/octet-stream;charset=utf-8;base64,)" + testing::base64(buffer) +
-           R"(","byteLength":)" + std::to_string(buffer.size()) + "}" + more_buffers + "]}";
+           R"("meshes":[{"primitives":[)" + primitive + R"(]}],"accessors":[)" + accessors +
+           R"(],"bufferViews":[)" + views +
+           R"(],"buffers":[{"uri":"data:application/octet-stream;charset=utf-8;base64,)" +
+           testing::base64(buffer) + R"(","byteLength":)" + std::to_string(buffer.size()) + "}" +
+           more_buffers + "]}";
   }
   static std::string view(std::size_t offset, std::size_t length, const std::string& more = "") {
-    return R"({"buffer":0,"byteOffset":)" + std::to_string(offset) + R"(,"byteLength":)" + std::to_string(length) + more + "}";
+    return R"({"buffer":0,"byteOffset":)" + std::to_string(offset) + R"(,"byteLength":)" +
+           std::to_string(length) + more + "}";
   }
   std::string error_of(const std::string& json) const {
     try {
@@ -59,7 +62,8 @@ constexpr const char* kAccessors =
     R"({"componentType":5126,"count":4,"type":"VEC3"},{"componentType":5123,"count":6,"type":"SCALAR"})";
 
 TEST_F(GltfVariants, SparseAccessorsReplaceZerosAndIndices) {
-  const std::string buffer = testing::bytes_of(std::vector<std::uint16_t>{0, 1, 2, 3}) + testing::bytes_of(kQuad) +
+  const std::string buffer = testing::bytes_of(std::vector<std::uint16_t>{0, 1, 2, 3}) +
+                             testing::bytes_of(kQuad) +
                              testing::bytes_of(std::vector<std::uint16_t>{0, 1, 2, 0, 2, 1, 5, 0, 3, 0});
   const std::string json = document(
       kPrimitive,
@@ -69,12 +73,14 @@ TEST_F(GltfVariants, SparseAccessorsReplaceZerosAndIndices) {
           "indices":{"bufferView":3,"componentType":5123},"values":{"bufferView":4}}})",
       view(0, 8) + "," + view(8, 48) + "," + view(56, 12) + "," + view(68, 2) + "," + view(72, 2), buffer);
   const LoadedScene loaded = load(json);
-  EXPECT_NEAR(testing::total_area(loaded.scene.objects.at(0).mesh), 1.0, 1e-6);  // of the quadrilateral, not twice a half
+  EXPECT_NEAR(testing::total_area(loaded.scene.objects.at(0).mesh), 1.0,
+              1e-6);  // of the quadrilateral, not twice a half
 }
 
 TEST_F(GltfVariants, ZerosAreNotAllocatedBeyondTheLimits) {
   EXPECT_THAT(error_of(document(kPrimitive, R"({"componentType":5126,"count":4000000000,"type":"VEC3"},
-      {"bufferView":0,"componentType":5123,"count":3,"type":"SCALAR"})", view(0, 6), std::string(6, '\0'))),
+      {"bufferView":0,"componentType":5123,"count":3,"type":"SCALAR"})",
+                                view(0, 6), std::string(6, '\0'))),
               HasSubstr("vertices"));
 }
 
@@ -83,8 +89,10 @@ TEST_F(GltfVariants, FacetsWithoutNormalsAreFlat) {
   const std::vector<float> positions = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};  // a tetrahedron
   const std::vector<std::uint16_t> faces = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
   const std::string buffer = testing::bytes_of(positions) + testing::bytes_of(faces);
-  const LoadedScene loaded = load(document(kPrimitive, R"({"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},
-      {"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"})", view(0, 48) + "," + view(48, 24), buffer));
+  const LoadedScene loaded =
+      load(document(kPrimitive, R"({"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},
+      {"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"})",
+                    view(0, 48) + "," + view(48, 24), buffer));
   const TriangleMesh& mesh = loaded.scene.objects.at(0).mesh;
   ASSERT_EQ(mesh.positions.size(), 12U);
   for (const glm::uvec3 t : mesh.triangles) {
@@ -100,8 +108,8 @@ TEST_F(GltfVariants, DracoMeshesAreDecoded) {
   const auto corner = [](std::uint16_t i) { return kQuad.data() + 3 * i; };
   for (int f = 0; f < 2; ++f) {
     const std::uint16_t* t = kTriangles.data() + 3 * f;
-    builder.SetAttributeValuesForFace(id, draco::FaceIndex(static_cast<std::uint32_t>(f)), corner(t[0]), corner(t[1]),
-                                      corner(t[2]));
+    builder.SetAttributeValuesForFace(id, draco::FaceIndex(static_cast<std::uint32_t>(f)), corner(t[0]),
+                                      corner(t[1]), corner(t[2]));
   }
   const auto mesh = builder.Finalize();
   const std::uint32_t unique = mesh->attribute(id)->unique_id();
@@ -109,10 +117,12 @@ TEST_F(GltfVariants, DracoMeshesAreDecoded) {
   ASSERT_TRUE(draco::Encoder().EncodeMeshToBuffer(*mesh, &encoded).ok());
   const std::string bytes(encoded.data(), encoded.size());
   const auto json = [&](const std::string& content) {
-    return document(R"({"attributes":{"POSITION":0},"indices":1,"extensions":{"KHR_draco_mesh_compression":{"bufferView":0,
-        "attributes":{"POSITION":)" + std::to_string(unique) + "}}}}",
-                    kAccessors, view(0, content.size()), content, "",
-                    R"("extensionsRequired":["KHR_draco_mesh_compression"],"extensionsUsed":["KHR_draco_mesh_compression"],)");
+    return document(
+        R"({"attributes":{"POSITION":0},"indices":1,"extensions":{"KHR_draco_mesh_compression":{"bufferView":0,
+        "attributes":{"POSITION":)" +
+            std::to_string(unique) + "}}}}",
+        kAccessors, view(0, content.size()), content, "",
+        R"("extensionsRequired":["KHR_draco_mesh_compression"],"extensionsUsed":["KHR_draco_mesh_compression"],)");
   };
   const LoadedScene loaded = load(json(bytes));
   EXPECT_THAT(loaded.warnings, IsEmpty());
@@ -126,20 +136,25 @@ TEST_F(GltfVariants, MeshoptViewsAreDecoded) {
   vertices.resize(meshopt_encodeVertexBuffer(vertices.data(), vertices.size(), kQuad.data(), 4, 12));
   std::vector<unsigned char> indices(meshopt_encodeIndexBufferBound(6, 4));
   indices.resize(meshopt_encodeIndexBuffer(indices.data(), indices.size(), kTriangles.data(), 6));
-  const std::string buffer(std::string(vertices.begin(), vertices.end()) + std::string(indices.begin(), indices.end()));
-  const auto compressed = [](std::size_t offset, std::size_t length, const std::string& mode, int stride, int count) {
+  const std::string buffer(std::string(vertices.begin(), vertices.end()) +
+                           std::string(indices.begin(), indices.end()));
+  const auto compressed = [](std::size_t offset, std::size_t length, const std::string& mode, int stride,
+                             int count) {
     return R"({"buffer":1,"byteLength":)" + std::to_string(stride * count) +
            R"(,"extensions":{"EXT_meshopt_compression":{"buffer":0,"byteOffset":)" + std::to_string(offset) +
-           R"(,"byteLength":)" + std::to_string(length) + R"(,"byteStride":)" + std::to_string(stride) + R"(,"count":)" +
-           std::to_string(count) + R"(,"mode":")" + mode + R"("}}})";
+           R"(,"byteLength":)" + std::to_string(length) + R"(,"byteStride":)" + std::to_string(stride) +
+           R"(,"count":)" + std::to_string(count) + R"(,"mode":")" + mode + R"("}}})";
   };
   const std::string accessors = R"({"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},
       {"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"})";
-  const std::string fallback = R"(,{"byteLength":60,"extensions":{"EXT_meshopt_compression":{"fallback":true}}})";
-  const std::string extra = R"("extensionsRequired":["EXT_meshopt_compression"],"extensionsUsed":["EXT_meshopt_compression"],)";
+  const std::string fallback =
+      R"(,{"byteLength":60,"extensions":{"EXT_meshopt_compression":{"fallback":true}}})";
+  const std::string extra =
+      R"("extensionsRequired":["EXT_meshopt_compression"],"extensionsUsed":["EXT_meshopt_compression"],)";
   const std::string index_view = compressed(vertices.size(), indices.size(), "TRIANGLES", 2, 6);
-  const LoadedScene loaded = load(document(
-      kPrimitive, accessors, compressed(0, vertices.size(), "ATTRIBUTES", 12, 4) + "," + index_view, buffer, fallback, extra));
+  const LoadedScene loaded = load(
+      document(kPrimitive, accessors, compressed(0, vertices.size(), "ATTRIBUTES", 12, 4) + "," + index_view,
+               buffer, fallback, extra));
   EXPECT_THAT(loaded.warnings, IsEmpty());
   EXPECT_NEAR(testing::total_area(loaded.scene.objects.at(0).mesh), 1.0, 1e-6);
   for (const auto& [broken, message] :
@@ -153,7 +168,8 @@ TEST_F(GltfVariants, MeshoptViewsAreDecoded) {
 }
 
 TEST_F(GltfVariants, VersionOneIsNamed) {
-  EXPECT_THAT(error_of(R"({"asset":{"version":"1.0"},"scenes":{"s":{"nodes":[]}}})"), HasSubstr("is a glTF 1.0 file"));
+  EXPECT_THAT(error_of(R"({"asset":{"version":"1.0"},"scenes":{"s":{"nodes":[]}}})"),
+              HasSubstr("is a glTF 1.0 file"));
   const std::string binary = "glTF" + testing::bytes_of(std::vector<std::uint32_t>{1, 20, 0, 0});
   try {
     load_scene(write("one.glb", binary));
@@ -198,7 +214,8 @@ TEST_F(GltfVariants, WebpTexturesAreRead) {
   WebPFree(encoded);
   Document d;
   d.materials = R"([{"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0}}])";
-  d.extra = R"("extensionsUsed":["EXT_texture_webp"],"textures":[{"extensions":{"EXT_texture_webp":{"source":0}}}],
+  d.extra =
+      R"("extensionsUsed":["EXT_texture_webp"],"textures":[{"extensions":{"EXT_texture_webp":{"source":0}}}],
       "images":[{"uri":"a.webp"}],)";
   const LoadedScene loaded = load(d);
   EXPECT_THAT(loaded.warnings, IsEmpty());
@@ -237,8 +254,10 @@ TEST_F(GltfVariants, OneImageMayBeNamedOften) {
     const std::string comma = i > 0 ? "," : "";
     images += comma + R"({"uri":"a.png"})";
     textures += comma + R"({"source":)" + std::to_string(i) + "}";
-    materials += comma + R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":)" + std::to_string(i) + "}}}";
-    primitives += comma + R"({"attributes":{"POSITION":0,"TEXCOORD_0":1},"indices":3,"material":)" + std::to_string(i) + "}";
+    materials +=
+        comma + R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":)" + std::to_string(i) + "}}}";
+    primitives += comma + R"({"attributes":{"POSITION":0,"TEXCOORD_0":1},"indices":3,"material":)" +
+                  std::to_string(i) + "}";
   }
   d.materials = "[" + materials + "]";
   d.primitives = "[" + primitives + "]";

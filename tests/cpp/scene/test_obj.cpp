@@ -136,9 +136,9 @@ TEST_F(Obj, EveryDefectIsAFileErrorThatSaysWhatIsWrong) {
 
 TEST_F(Obj, ReadsLinesAsOtherProgramsWriteThem) {
   const std::string vertices = "v 0 0 0\nv 1 0 0 # corner\nv 1 1 0\nv 0 1 1e-400\nvt 0 0\n";
-  const std::vector<std::string> quads = {"f 1 2 3 4 # quad\n",   "f 1 2 \\\n 3 4\n",      "f 1 2 \\\r\n 3 \\ \n4",
-                                          "f 1/ 2/ 3/ 4/\n",      "f 1/1/ 2/1/ 3/1/ 4/1/", "f 1// 2// 3// 4//\n",
-                                          "\tf\t1  2\t3 4 \r\n"};
+  const std::vector<std::string> quads = {
+      "f 1 2 3 4 # quad\n",    "f 1 2 \\\n 3 4\n",    "f 1 2 \\\r\n 3 \\ \n4", "f 1/ 2/ 3/ 4/\n",
+      "f 1/1/ 2/1/ 3/1/ 4/1/", "f 1// 2// 3// 4//\n", "\tf\t1  2\t3 4 \r\n"};
   for (const std::string& quad : quads) {
     const TriangleMesh mesh = load_mesh(write("a.obj", "\xef\xbb\xbf# made\n" + vertices + quad));
     EXPECT_EQ(mesh.triangles.size(), 2U) << quad;
@@ -150,7 +150,8 @@ TEST_F(Obj, ReadsLinesAsOtherProgramsWriteThem) {
 TEST_F(Obj, SmoothingGroupsDecideWhichFacetsShareANormal) {
   const std::string roof = "v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 1\nv 0 2 0\nv 1 2 0\n";
   const auto ridge = [&](const std::string& first, const std::string& second) {
-    const TriangleMesh mesh = load_mesh(write("roof.obj", roof + first + "f 1 2 3 4\n" + second + "f 4 3 6 5\n"));
+    const TriangleMesh mesh =
+        load_mesh(write("roof.obj", roof + first + "f 1 2 3 4\n" + second + "f 4 3 6 5\n"));
     float least = 1.0F;  // cosine between normals and the facets they belong to
     for (const glm::uvec3 t : mesh.triangles) {
       const glm::vec3 facet(glm::normalize(testing::area_vector(mesh, t)));
@@ -179,7 +180,8 @@ TEST_F(Obj, LargeConcavePolygonsAreNoFan) {
   constexpr int kTeeth = 5000;
   std::string text = "v 0 0 7\nv " + std::to_string(2 * kTeeth) + " 0 7\n";
   for (int i = kTeeth; i-- > 0;) {
-    for (const auto& [x, y] : {std::pair(2 * i + 2, 1), std::pair(2 * i + 1, 1), std::pair(2 * i + 1, 3), std::pair(2 * i, 3)}) {
+    for (const auto& [x, y] :
+         {std::pair(2 * i + 2, 1), std::pair(2 * i + 1, 1), std::pair(2 * i + 1, 3), std::pair(2 * i, 3)}) {
       text += "v " + std::to_string(x) + " " + std::to_string(y) + " 7\n";
     }
   }

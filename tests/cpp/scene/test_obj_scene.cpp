@@ -193,7 +193,8 @@ TEST_F(ObjSceneFile, OddLinesOfALibraryAreWarnings) {
     EXPECT_THAT(loaded.warnings[0].message, HasSubstr(expected));
     EXPECT_EQ(loaded.scene.materials[0].albedo_texture.texture, -1);
   }
-  const LoadedScene outside = load_scene(write("escape.obj", std::string("mtllib ../other.mtl\n") + kTriangles));
+  const LoadedScene outside =
+      load_scene(write("escape.obj", std::string("mtllib ../other.mtl\n") + kTriangles));
   EXPECT_THAT(outside.warnings.at(0).message, HasSubstr("'../other.mtl' is not inside"));
 }
 
@@ -208,7 +209,8 @@ TEST_F(ObjSceneFile, NamesMayHaveSpacesAroundThemAndOptionsBehind) {
   const LoadedScene loaded = load("\xef\xbb\xbfnewmtl \t red\nmap_Kd my map.png -s 2 3 1\nnewmtl shiny \n");
   EXPECT_THAT(loaded.warnings, IsEmpty());
   EXPECT_EQ(loaded.scene.materials.at(0).albedo_texture.scale, glm::vec2(2, 3));
-  const std::string path = write("names.obj", std::string("mtllib .\\lib\\a.mtl\nusemtl  \tred \n") + kTriangles);
+  const std::string path =
+      write("names.obj", std::string("mtllib .\\lib\\a.mtl\nusemtl  \tred \n") + kTriangles);
   write("lib/a.mtl", "newmtl red\nKd 1 0 0\n");
   EXPECT_EQ(load_scene(path).scene.materials.at(0).name, "red");
 }
@@ -223,7 +225,8 @@ TEST_F(ObjSceneFile, GroupsAreTheObjectsWhereNoneIsNamed) {
   const std::string quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
   const auto names = [&](const std::string& text) {
     std::vector<std::string> result;
-    for (const Object& object : load_scene(write("g.obj", quad + text)).scene.objects) result.push_back(object.name);
+    for (const Object& object : load_scene(write("g.obj", quad + text)).scene.objects)
+      result.push_back(object.name);
     return result;
   };
   EXPECT_THAT(names("g body\nf 1 2 3\ng lid top\nf 1 3 4\n"), ElementsAre("body", "lid top"));
@@ -231,8 +234,8 @@ TEST_F(ObjSceneFile, GroupsAreTheObjectsWhereNoneIsNamed) {
 }
 
 TEST_F(ObjSceneFile, WhatIsNoTriangleIsCountedAndColoursAreKept) {
-  const LoadedScene loaded = load_scene(
-      write("v.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 1 1 0\nl 1 2\nl 2 3\np 1\ncurv 0 1 1 2 3\nf 1 2 3\n"));
+  const LoadedScene loaded = load_scene(write(
+      "v.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 1 1 0\nl 1 2\nl 2 3\np 1\ncurv 0 1 1 2 3\nf 1 2 3\n"));
   EXPECT_THAT(messages(loaded), ElementsAre("lines are not supported x2", "points are not supported x1",
                                             "curves and surfaces are not supported x1"));
   const std::vector<glm::vec3>& colors = loaded.scene.objects.at(0).mesh.colors;

@@ -24,6 +24,7 @@ struct Plate {
     camera.eye = {0.0F, 3.0F, 0.5F};
     camera.width = camera.height = 16;
   }
+  // A sum of floats: good to 1e-4.
   glm::vec3 mean_normal() const {
     const LayerTrace trace = Tracer(scene, {.indirect = IndirectLight::none}).trace_layers(camera, 0, {});
     EXPECT_GT(trace.samples.size(), 100U);
@@ -42,17 +43,17 @@ TEST(SurfaceMaps, ANormalTextureTiltsTheNormalAlongTheTextureCoordinates) {
   for (int c = 0; c < 3; ++c) texture.image.pixels[static_cast<std::size_t>(c)] = 0.5F * tilt[c] + 0.5F;
   plate.scene.textures.push_back(texture);
   Material& material = plate.scene.materials[0];
-  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-5F);
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-4F);
   material.normal_texture.texture = 0;
-  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(tilt.x, tilt.z, -tilt.y)), 1e-5F);
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(tilt.x, tilt.z, -tilt.y)), 1e-4F);
   // Coordinates that run the other way turn the tangent with them, not the bitangent.
   for (glm::vec2& uv : plate.scene.objects[0].mesh.uvs) uv.x = -uv.x;
-  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(-tilt.x, tilt.z, -tilt.y)), 1e-5F);
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(-tilt.x, tilt.z, -tilt.y)), 1e-4F);
   material.normal_scale = 0.0F;
-  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-5F);
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-4F);
   material.normal_scale = 1.0F;
   plate.scene.objects[0].mesh.uvs.clear();
-  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-5F);
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-4F);
 }
 
 TEST(SurfaceMaps, ColoursOfTheMeshMultiplyAlbedoAndOfMetalsTheReflectance) {

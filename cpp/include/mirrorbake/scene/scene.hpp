@@ -22,7 +22,8 @@ struct TriangleMesh {
   std::vector<glm::vec2> uvs;         ///< one per vertex, v up; empty: (0,0)
   std::vector<glm::uvec3> triangles;  ///< counter-clockwise seen from outside
   std::vector<std::uint16_t> parts;   ///< part of each triangle; empty: all belong to part 0
-  std::vector<glm::vec3> colors = {};  ///< one per vertex, in [0,1], linear, multiply the albedo; empty: (1,1,1)
+  std::vector<glm::vec3> colors =
+      {};  ///< one per vertex, in [0,1], linear, multiply the albedo; empty: (1,1,1)
 };
 
 /// Texels that materials refer to: in memory, or in a file.

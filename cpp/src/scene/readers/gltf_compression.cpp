@@ -14,7 +14,8 @@
 namespace mirrorbake::gltf {
 namespace {
 
-std::uint64_t whole_number(const std::string& path, const tinygltf::Value& object, const char* key, const char* extension) {
+std::uint64_t whole_number(const std::string& path, const tinygltf::Value& object, const char* key,
+                           const char* extension) {
   const tinygltf::Value& value = object.Get(key);
   const double number = value.IsNumber() ? value.GetNumberAsDouble() : object.Has(key) ? -1.0 : 0.0;
   if (!(number >= 0.0 && number <= 4294967295.0) || number != std::floor(number)) {
@@ -23,7 +24,8 @@ std::uint64_t whole_number(const std::string& path, const tinygltf::Value& objec
   return static_cast<std::uint64_t>(number);
 }
 
-int index_number(const std::string& path, const tinygltf::Value& object, const char* key, const char* extension) {
+int index_number(const std::string& path, const tinygltf::Value& object, const char* key,
+                 const char* extension) {
   const std::uint64_t number = whole_number(path, object, key, extension);
   return number > static_cast<std::uint64_t>(std::numeric_limits<int>::max()) ? -1 : static_cast<int>(number);
 }
@@ -84,7 +86,8 @@ Numbers DracoMesh::numbers(const std::string& attribute, int components) const {
   for (draco::PointIndex point(0); point < mesh.num_points(); ++point) {
     const draco::AttributeValueIndex value = source->mapped_index(point);
     float* to = result.values.data() + std::size_t{point.value()} * static_cast<std::size_t>(count);
-    if (value.value() >= source->size() || !source->ConvertValue<float>(value, static_cast<std::int8_t>(count), to)) {
+    if (value.value() >= source->size() ||
+        !source->ConvertValue<float>(value, static_cast<std::int8_t>(count), to)) {
       fail(path_, "has a Draco mesh whose " + attribute + " is damaged");
     }
   }
@@ -105,7 +108,8 @@ void decompress_views(const std::string& path, tinygltf::Model& model) {
     const std::uint64_t length = number("byteLength");
     const std::uint64_t stride = number("byteStride");
     const std::uint64_t count = number("count");
-    if (offset > source.size() || length > source.size() - offset) fail(path, where + " ends beyond its buffer");
+    if (offset > source.size() || length > source.size() - offset)
+      fail(path, where + " ends beyond its buffer");
     // Each block of the codec has a header of a quarter of a byte for 16 elements, so that sizes are bounded by the file's.
     if (stride == 0 || stride > 256 || count > 64 * length || count * stride != view.byteLength) {
       fail(path, where + " has " + std::to_string(count) + " elements of " + std::to_string(stride) +

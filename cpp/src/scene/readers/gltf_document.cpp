@@ -25,11 +25,9 @@ constexpr int kMaxJsonDepth = 256;
 constexpr std::uint64_t kMaxRepeatedBytes = std::uint64_t{1} << 28;
 
 constexpr std::array<std::string_view, 9> kKnown = {
-    "EXT_meshopt_compression",    "EXT_texture_webp",
-    "KHR_draco_mesh_compression", "KHR_lights_punctual",
-    "KHR_materials_ior",          "KHR_materials_emissive_strength",
-    "KHR_materials_unlit",        "KHR_mesh_quantization",
-    "KHR_texture_transform"};
+    "EXT_meshopt_compression", "EXT_texture_webp",      "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",     "KHR_materials_ior",     "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",     "KHR_mesh_quantization", "KHR_texture_transform"};
 
 // What tinygltf would let pass: deep nesting, and negative sizes, which it takes for absent ones.
 void check_json(const std::string& path, std::string_view json) {
@@ -63,7 +61,8 @@ void check_json(const std::string& path, std::string_view json) {
 constexpr const char* kPlaceholder = "\x01placeholder";
 
 std::optional<std::string> without_placeholders(std::string_view json) {
-  if (json.find(kDraco) == std::string_view::npos && json.find(kMeshopt) == std::string_view::npos) return std::nullopt;
+  if (json.find(kDraco) == std::string_view::npos && json.find(kMeshopt) == std::string_view::npos)
+    return std::nullopt;
   nlohmann::json document = nlohmann::json::parse(json.begin(), json.end(), nullptr, false);
   if (!document.is_object() || !document["buffers"].is_array() || !document["accessors"].is_array() ||
       !document["bufferViews"].is_array()) {
@@ -93,8 +92,8 @@ std::string with_json(const std::string& bytes, std::size_t size, std::string js
     return std::string(reinterpret_cast<const char*>(&number), sizeof number);
   };
   const std::string chunks = bytes.substr(20 + size);
-  return bytes.substr(0, 8) + word(20 + json.size() + chunks.size()) + word(json.size()) + bytes.substr(16, 4) + json +
-         chunks;
+  return bytes.substr(0, 8) + word(20 + json.size() + chunks.size()) + word(json.size()) +
+         bytes.substr(16, 4) + json + chunks;
 }
 
 // Before tinygltf, to which such a file is an empty one or an error about something else.
@@ -394,7 +393,8 @@ tinygltf::Model read_document(const std::string& path) {
   if (is_version_1(binary, bytes)) fail(path, "is a glTF 1.0 file, expected glTF 2.0");
   const std::string_view json = binary ? json_chunk(path, bytes) : std::string_view(bytes);
   check_json(path, json);
-  if (const auto text = without_placeholders(json)) bytes = binary ? with_json(bytes, json.size(), *text) : *text;
+  if (const auto text = without_placeholders(json))
+    bytes = binary ? with_json(bytes, json.size(), *text) : *text;
 
   std::error_code code;
   Directory directory{std::filesystem::weakly_canonical(path, code).parent_path(), {}, {}, {}};
@@ -429,7 +429,8 @@ tinygltf::Model read_document(const std::string& path) {
     }
   }
   for (tinygltf::Accessor& accessor : model.accessors) {
-    if (accessor.bufferView >= 0 && static_cast<std::size_t>(accessor.bufferView) < model.bufferViews.size() &&
+    if (accessor.bufferView >= 0 &&
+        static_cast<std::size_t>(accessor.bufferView) < model.bufferViews.size() &&
         model.bufferViews[static_cast<std::size_t>(accessor.bufferView)].name == kPlaceholder) {
       accessor.bufferView = -1;
     }
@@ -478,7 +479,8 @@ Numbers read_numbers(const std::string& path, const tinygltf::Model& model, int 
   }
   apply_sparse(path, model, accessor, name, components * size, [&](std::size_t i, const unsigned char* from) {
     for (std::size_t k = 0; k < components; ++k) {
-      numbers.values[i * components + k] = decode(from + k * size, accessor.componentType, accessor.normalized);
+      numbers.values[i * components + k] =
+          decode(from + k * size, accessor.componentType, accessor.normalized);
     }
   });
   return numbers;

@@ -147,7 +147,8 @@ std::optional<MaterialReader::Use> MaterialReader::use_of(int texture, int uv_se
   const tinygltf::Value* webp = extension(t.extensions, "EXT_texture_webp");
   if (webp != nullptr && webp->Get("source").IsNumber()) {
     const double source = webp->Get("source").GetNumberAsDouble();
-    use.image = source >= 0.0 && source < static_cast<double>(model_.images.size()) ? static_cast<int>(source) : -2;
+    use.image =
+        source >= 0.0 && source < static_cast<double>(model_.images.size()) ? static_cast<int>(source) : -2;
   }
   if (use.image == -1) {
     warnings_.add("textures without an image that is known are left out");
@@ -398,7 +399,8 @@ void MaterialReader::set_opacity(const tinygltf::Material& material, const Param
 }
 
 // glTF 2.0 §3.9.3.
-void MaterialReader::set_normal(const tinygltf::Material& material, const std::string& where, Material& result) {
+void MaterialReader::set_normal(const tinygltf::Material& material, const std::string& where,
+                                Material& result) {
   const auto& info = material.normalTexture;
   const std::optional<Use> use = use_of(info.index, info.texCoord, info.extensions, where + "normal");
   if (!use) return;

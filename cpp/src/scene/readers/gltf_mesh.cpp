@@ -104,15 +104,18 @@ class GltfBuilder {
                      const glm::dmat4& world_from_node) {
     if (attribute(primitive, "POSITION") < 0) fail(path_, "mesh of node '" + name + "' has no positions");
     const auto draco = primitive.extensions.find(gltf::kDraco);
-    Vertices vertices = draco != primitive.extensions.end() ? decompressed(primitive, draco->second) : read(primitive);
+    Vertices vertices =
+        draco != primitive.extensions.end() ? decompressed(primitive, draco->second) : read(primitive);
     // glTF 2.0 §3.7.2.1: without normals, facets are flat.
     const bool is_flat = vertices.normals.empty();
     TriangleMesh& mesh = loaded_.mesh;
-    check_limits(path_, mesh.positions.size() + (is_flat ? 3 * vertices.triangles.size() : vertices.positions.size()),
-                 mesh.triangles.size() + vertices.triangles.size(), limits_);
+    check_limits(
+        path_, mesh.positions.size() + (is_flat ? 3 * vertices.triangles.size() : vertices.positions.size()),
+        mesh.triangles.size() + vertices.triangles.size(), limits_);
     if (is_flat) vertices = unshared(vertices);
     append(vertices, world_from_node);
-    loaded_.groups.push_back({name, node, primitive.material, mesh.triangles.size() - vertices.triangles.size()});
+    loaded_.groups.push_back(
+        {name, node, primitive.material, mesh.triangles.size() - vertices.triangles.size()});
   }
 
   void append(const Vertices& vertices, const glm::dmat4& world_from_node) {
@@ -139,7 +142,8 @@ class GltfBuilder {
     }
     for (std::size_t i = mesh.normals.size(); i < mesh.positions.size(); i += 3) {
       const glm::dvec3 corner(mesh.positions[i]);
-      const glm::dvec3 across = glm::cross(glm::dvec3(mesh.positions[i + 1]) - corner, glm::dvec3(mesh.positions[i + 2]) - corner);
+      const glm::dvec3 across =
+          glm::cross(glm::dvec3(mesh.positions[i + 1]) - corner, glm::dvec3(mesh.positions[i + 2]) - corner);
       const double length = glm::length(across);
       const glm::vec3 facet(length > 0.0 ? (is_mirrored ? -across : across) / length : glm::dvec3(0.0));
       mesh.normals.insert(mesh.normals.end(), 3, facet);
@@ -153,11 +157,12 @@ class GltfBuilder {
   }
 
   // The numbers of an attribute, one row for each vertex; nothing if there is none. `type` 0 stands for VEC3 or VEC4.
-  gltf::Numbers numbers(const tinygltf::Primitive& primitive, const std::string& name, int type, const char* what,
-                        std::size_t vertex_count) const {
+  gltf::Numbers numbers(const tinygltf::Primitive& primitive, const std::string& name, int type,
+                        const char* what, std::size_t vertex_count) const {
     const int accessor = attribute(primitive, name);
     if (accessor < 0) return {};
-    const tinygltf::Accessor& source = gltf::element(path_, model_.accessors, accessor, std::string(what) + " accessor");
+    const tinygltf::Accessor& source =
+        gltf::element(path_, model_.accessors, accessor, std::string(what) + " accessor");
     if (source.count != vertex_count) {
       fail(path_, std::string("number of ") + what + "s is " + std::to_string(source.count) +
                       ", expected one for each of " + std::to_string(vertex_count) + " vertices");
@@ -169,7 +174,8 @@ class GltfBuilder {
 
   Vertices read(const tinygltf::Primitive& primitive) const {
     // The limits come before anything is read.
-    const std::size_t count = gltf::element_count(path_, model_, attribute(primitive, "POSITION"), "position");
+    const std::size_t count =
+        gltf::element_count(path_, model_, attribute(primitive, "POSITION"), "position");
     check_limits(path_, loaded_.mesh.positions.size() + count, loaded_.mesh.triangles.size(), limits_);
     Vertices result;
     set_rows(numbers(primitive, "POSITION", TINYGLTF_TYPE_VEC3, "position", count), result.positions);
@@ -181,7 +187,8 @@ class GltfBuilder {
   }
 
   Vertices decompressed(const tinygltf::Primitive& primitive, const tinygltf::Value& extension) const {
-    const std::size_t count = gltf::element_count(path_, model_, attribute(primitive, "POSITION"), "position");
+    const std::size_t count =
+        gltf::element_count(path_, model_, attribute(primitive, "POSITION"), "position");
     check_limits(path_, loaded_.mesh.positions.size() + count, loaded_.mesh.triangles.size(), limits_);
     const gltf::DracoMesh mesh(path_, model_, extension, limits_);
     Vertices result;

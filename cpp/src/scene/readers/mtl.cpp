@@ -37,16 +37,16 @@ struct Unusable {
 
 // Linear Rec. 709 from CIE XYZ (IEC 61966-2-1).
 glm::vec3 rec709_from_xyz(glm::vec3 v) {
-  return glm::max(glm::vec3(3.2406F * v.x - 1.5372F * v.y - 0.4986F * v.z,
-                            -0.9689F * v.x + 1.8758F * v.y + 0.0415F * v.z,
-                            0.0557F * v.x - 0.2040F * v.y + 1.0570F * v.z),
-                  0.0F);
+  return glm::max(
+      glm::vec3(3.2406F * v.x - 1.5372F * v.y - 0.4986F * v.z, -0.9689F * v.x + 1.8758F * v.y + 0.0415F * v.z,
+                0.0557F * v.x - 0.2040F * v.y + 1.0570F * v.z),
+      0.0F);
 }
 
 // Where options begin that follow the name of a file, which may have spaces and dashes itself.
 std::size_t options_after(std::string_view text) {
-  constexpr std::array<std::string_view, 11> kOptions = {"-o",      "-s",     "-t",  "-mm", "-clamp",  "-blendu",
-                                                         "-blendv", "-boost", "-bm", "-texres", "-imfchan"};
+  constexpr std::array<std::string_view, 11> kOptions = {
+      "-o", "-s", "-t", "-mm", "-clamp", "-blendu", "-blendv", "-boost", "-bm", "-texres", "-imfchan"};
   for (std::size_t at = text.find_first_of(kSpace); at != std::string_view::npos;
        at = text.find_first_of(kSpace, at + 1)) {
     const std::string_view token = split_keyword(text.substr(at)).first;
@@ -61,8 +61,8 @@ class Line {
   Line(std::string_view keyword, std::string_view rest) : keyword_(keyword), rest_(rest) {}
 
   [[noreturn]] void fail(const std::string& expected) const {
-    throw Unusable{std::string(keyword_.substr(0, 40)) + " '" + std::string(rest_.substr(0, 40)) + "', expected " +
-                   expected};
+    throw Unusable{std::string(keyword_.substr(0, 40)) + " '" + std::string(rest_.substr(0, 40)) +
+                   "', expected " + expected};
   }
 
   std::string_view rest() const { return rest_; }

@@ -39,7 +39,8 @@ class ObjScene {
       if (material_of.contains(group.material)) continue;
       material_of[group.material] = static_cast<int>(loaded_.scene.materials.size());
       loaded_.scene.materials.push_back(
-          group.material < 0 ? unnamed() : material(used.materials[static_cast<std::size_t>(group.material)]));
+          group.material < 0 ? unnamed()
+                             : material(used.materials[static_cast<std::size_t>(group.material)]));
     }
     loaded_.scene.objects = split_into_objects(std::move(mesh), loaded_.scene.materials, material_of);
     loaded_.warnings = warnings_.take();
@@ -59,7 +60,8 @@ class ObjScene {
   }
 
   // The file that a reference means, if it can be read. What is outside of the file's own directory never is.
-  std::optional<fs::path> existing(const fs::path& from, const std::string& what, const std::string& reference) {
+  std::optional<fs::path> existing(const fs::path& from, const std::string& what,
+                                   const std::string& reference) {
     std::error_code code;
     const auto target = resolve_inside(from.parent_path(), reference);
     if (!target) {

@@ -57,8 +57,13 @@ class Polygon {
 // the buckets of a grid over the polygon's plane.
 class Ring {
  public:
-  Ring(const std::string& path, std::span<const std::uint32_t> corners, const std::vector<glm::vec3>& positions)
-      : path_(path), count_(static_cast<std::uint32_t>(corners.size())), points_(count_), previous_(count_), next_(count_) {
+  Ring(const std::string& path, std::span<const std::uint32_t> corners,
+       const std::vector<glm::vec3>& positions)
+      : path_(path),
+        count_(static_cast<std::uint32_t>(corners.size())),
+        points_(count_),
+        previous_(count_),
+        next_(count_) {
     project(corners, positions);
     for (std::uint32_t i = 0; i < count_; ++i) {
       previous_[i] = (i + count_ - 1) % count_;
@@ -150,8 +155,9 @@ class Ring {
       }
     }
     if (looks_ > kMostLooks) {
-      throw FileError(path_, "has a polygon of " + std::to_string(count_) +
-                                 " corners that is too entangled, expected one that can be cut into triangles");
+      throw FileError(path_,
+                      "has a polygon of " + std::to_string(count_) +
+                          " corners that is too entangled, expected one that can be cut into triangles");
     }
     return true;
   }
@@ -171,8 +177,8 @@ class Ring {
 
 }  // namespace
 
-void triangulate(const std::string& path, std::span<const std::uint32_t> corners, const std::vector<glm::vec3>& positions,
-                 std::vector<glm::uvec3>& triples) {
+void triangulate(const std::string& path, std::span<const std::uint32_t> corners,
+                 const std::vector<glm::vec3>& positions, std::vector<glm::uvec3>& triples) {
   const std::uint32_t count = static_cast<std::uint32_t>(corners.size());
   if (count == 3) {
     triples.push_back({0, 1, 2});

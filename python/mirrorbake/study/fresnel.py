@@ -92,7 +92,7 @@ def _cosines(dtype: type[np.floating[Any]], count: int) -> Any:
     return np.unique(np.concatenate([np.linspace(0, 1, count - count // 2), low]).astype(dtype))
 
 
-def _rounding(count: int) -> list[dict[str, Any]]:
+def rounding(count: int) -> list[dict[str, Any]]:
     """Error curves of both precisions against mpmath."""
     import mpmath
 
@@ -157,7 +157,7 @@ def study(max_error: float = 1e-3, samples: int = 200) -> dict[str, Any]:
         "threads": _core.thread_count(),
         "max_error": max_error,
         "approximations": _approximations(max_error),
-        "rounding": _rounding(samples),
+        "rounding": rounding(samples),
         "metals": [vars(fresnel.metal_colour(metal)) for metal in fresnel.metal_names()],
     }
 

@@ -79,10 +79,10 @@ def test_the_box_is_the_room_that_the_teapot_sees(baked: Baked) -> None:
     header = PemStore.open(baked.directory).header
     box = header.static["proxy"]
     assert box["shape"] == "box"
-    assert [part["name"] for part in header.parts] == ["body", "lid"]
+    assert [part.name for part in header.parts] == ["body", "lid"]
     for part in header.parts:
-        assert part["layers"].keys() == {"local", "distant"}
-        assert part["layers"]["distant"] == box
+        assert [shell.name for shell in part.shells] == ["local", "distant"]
+        assert part.shells[1].proxy == box
     # It stands on the table, and is a room's size.
     assert abs(box["centre"][1] - box["half_extent"][1]) < 0.1
     assert all(0.5 < extent < 5.0 for extent in box["half_extent"])
@@ -92,7 +92,7 @@ def test_the_ellipsoid_of_each_part_encloses_it(baked: Baked) -> None:
     built = baked.stage.built
     header = PemStore.open(baked.directory).header
     for number, part in enumerate(header.parts):
-        ellipsoid = part["layers"]["local"]
+        ellipsoid = part.shells[0].proxy
         points = built.positions[np.unique(built.triangles[built.parts == number])]
         scaled = (points - np.array(ellipsoid["centre"])) / np.array(ellipsoid["radii"])
         farthest = np.linalg.norm(scaled, axis=1).max()
@@ -113,9 +113,9 @@ def test_polygons_on_the_convex_hull_have_no_local_layer(baked: Baked) -> None:
     parts = [
         [
             _core.ShellMap(
-                proxy_from_attributes(part["layers"]["distant"]),
+                proxy_from_attributes(part.shells[1].proxy),
                 _core.TexelTopology.cube(pem.store.header.map_size),
-                pem.store.read_map(part["name"], "distant", 0),
+                pem.store.read_map(part.name, "distant", 0),
             )
         ]
         for part in pem.store.header.parts
@@ -153,10 +153,10 @@ def test_between_two_views_the_maps_are_blended_linearly(baked: Baked) -> None:
     parts = []
     for part in store.header.parts:
         maps = {
-            layer: 0.5 * (store.read_map(part["name"], layer, 0) + store.read_map(part["name"], layer, 1))
+            layer: 0.5 * (store.read_map(part.name, layer, 0) + store.read_map(part.name, layer, 1))
             for layer in ("local", "distant")
         }
-        proxies = {layer: proxy_from_attributes(part["layers"][layer]) for layer in maps}
+        proxies = {shell.name: proxy_from_attributes(shell.proxy) for shell in part.shells}
         local = _core.ShellMap(proxies["local"], topology, maps["local"], split)
         parts.append([local, _core.ShellMap(proxies["distant"], topology, maps["distant"])])
     image = _core.render_reflector(samples, parts, None, lookups_of(0.25))
@@ -239,7 +239,7 @@ def test_under_a_panorama_the_distant_map_lies_at_infinity(tmp_path: Path) -> No
     bake(stage.config, tmp_path / "pem", None, stage)
     header = PemStore.open(tmp_path / "pem").header
     assert header.static["proxy"] is None
-    assert all(part["layers"]["distant"]["shape"] == "infinite" for part in header.parts)
+    assert all(part.shells[-1].proxy["shape"] == "infinite" for part in header.parts)
     evaluation = evaluate(tmp_path / "pem", None, stage)
     assert all("static_proxy" not in view.metrics["psnr"] for view in evaluation.views)
     lead = mean(evaluation, "pem", "on") - mean(evaluation, "static_infinite", "on")

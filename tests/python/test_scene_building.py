@@ -10,10 +10,11 @@ import pytest
 
 from mirrorbake import _core
 from mirrorbake.errors import InputError
-from mirrorbake.scene.build import build_scene, rotation_matrix, winding_number
+from mirrorbake.scene.build import build_scene, winding_number
 from mirrorbake.scene.cameras import Cameras
 from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.pose import rotation_matrix
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -1,9 +1,13 @@
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import http.server
 import json
+import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +18,10 @@ import zarr
 from mirrorbake.errors import StoreError
 from mirrorbake.pem.header import Header, Source
 from mirrorbake.pem.pyramid import coarser_sizes, decimate, join_pyramid, residual_texels, split_pyramid
-from mirrorbake.pem.store import GROUP_NAME, PemStore, Timings, exclusive
+from mirrorbake.pem.schema import checksum_of
+from mirrorbake.pem.shells import Part, Shell
+from mirrorbake.pem.store import GROUP_NAME, Contents, PemStore, SolverReport, Timings, exclusive
+from mirrorbake.pem.verify import verify
 from mirrorbake.pem.view_images import ViewImages
 from mirrorbake.scene.parameters import Axis, ParameterSpace
 from mirrorbake.scene.plan import Decision, Plan
@@ -35,19 +42,21 @@ def make_plan(samples: int = 4) -> Plan:
 
 
 def make_header(**changes: Any) -> Header:
-    proxy = {"shape": "infinite", "origin": [0.0, 0.0, 0.0]}
+    proxy: dict[str, Any] = {"shape": "infinite", "origin": [0.0, 0.0, 0.0]}
+    distant = Shell("distant", proxy, "body/distant", "all", "rest", moves=False)
     header = Header(
         source=Source("1.2.3", {"maps": {"size": SIZE}, "reflector": {"mesh": "/a/cow.obj"}}, {}),
         plan=make_plan(),
         space=ParameterSpace((Axis("arc", (0.0, 0.5, 1.0), 0.0, 1.0),)),
-        parts=[
-            {"name": "body", "layers": {"local": proxy, "distant": proxy}},
-            {"name": "lid", "layers": {"distant": proxy}},
-        ],
+        parts=(
+            Part("body", (Shell("local", proxy, "body/local", "all", "itself", moves=True), distant)),
+            Part("lid", (dataclasses.replace(distant, map="lid/distant"),)),
+        ),
         static={"infinite": proxy, "proxy": None},
         map_size=SIZE,
         precision="float16",
         image_size=(WIDTH, HEIGHT),
+        run_time={"name": "reference", "lookups": 4, "footprint_scale": 0.25},
     )
     return dataclasses.replace(header, **changes)
 
@@ -68,14 +77,24 @@ def make_view(seed: int) -> tuple[dict[tuple[str, str], np.ndarray], ViewImages]
     return maps, images
 
 
-def make_store(directory: Path, **changes: Any) -> PemStore:
+def make_contents(**changes: Any) -> Contents:
     capture = np.random.default_rng(9).random((6, SIZE, SIZE, 3), np.float32)
-    return PemStore.create(directory, make_header(**changes), capture, None)
+    return Contents(make_header(**changes), capture, None, np.ones(12, np.uint8))
+
+
+def make_store(directory: Path | str, **changes: Any) -> PemStore:
+    return PemStore.create(directory, make_contents(**changes))
 
 
 def fill(store: PemStore) -> None:
     for index in range(VIEWS):
-        store.write_view(index, *make_view(index), Timings(1.0, 2.0, 3.0))
+        store.write_view(index, *make_view(index), Timings(1.0, 2.0, 3.0), REPORTS)
+
+
+REPORTS = {
+    ("body", "local"): SolverReport(7, 1e-4, True),
+    ("body", "distant"): SolverReport(200, 0.5, False),
+}
 
 
 def test_decimation_takes_the_mean_of_each_2x2_block() -> None:
@@ -143,38 +162,49 @@ def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
     assert attributes["format_version"] == 3
     sizes = attributes["conventions"]["level_sizes"]
     assert sizes == [8, 4, 2, 1]
-    finest = np.asarray(group["maps/body/local/finest"][1], np.float32)
-    residuals = np.asarray(group["maps/body/local/residuals"][1], np.float32)
+    names = [entry["name"] for entry in attributes["maps"]]
+    assert names == ["body/local", "body/distant", "lid/distant"]
+    texels = np.asarray(group["maps"][1, names.index("body/local")], np.float32)
     expected = make_view(1)[0]["body", "local"]
-    level, offset = finest, 0
+    level, offset = texels[: 6 * 64].reshape(6, 8, 8, 4), 6 * 64
     for size in sizes[1:]:
         level = level.reshape(6, size, 2, size, 2, 4).mean(axis=(2, 4))
         rows = slice(offset, offset + 6 * size * size)
-        values = level.reshape(-1, 4) + residuals[rows]
-        start = 6 * 64 + offset
-        np.testing.assert_allclose(
-            values, expected[start : start + 6 * size * size], rtol=0, atol=HALF_ROUNDING
-        )
+        values = level.reshape(-1, 4) + texels[rows]
+        np.testing.assert_allclose(values, expected[rows], rtol=0, atol=HALF_ROUNDING)
         offset += 6 * size * size
-    assert group["maps/body/local/finest"].chunks == (1, 6, 8, 8, 4)
+    # An opaque map beside one with α is opaque in it, too.
+    assert (np.asarray(group["maps"][1, names.index("lid/distant")])[: 6 * 64, 3] == 1).all()
+    record = dict(zip(attributes["record"], np.asarray(group["record"][1]), strict=True))
+    assert record["trace_s"] == 1.0
+    assert (record["iterations: body/local"], record["converged: body/local"]) == (7, 1)
+    assert (record["gradient: body/distant"], record["converged: body/distant"]) == (0.5, 0)
 
 
-def test_each_view_is_a_chunk_of_its_own_and_its_mark_is_written_last(tmp_path: Path) -> None:
+def files_of(directory: Path) -> set[Path]:
+    return {path for path in directory.rglob("*") if path.is_file()}
+
+
+def test_a_sample_is_three_objects_and_its_record_is_written_last(tmp_path: Path) -> None:
     store = make_store(tmp_path)
-    before = {path for path in tmp_path.rglob("*") if path.is_file()}
+    before = files_of(tmp_path)
     store.write_view(1, *make_view(1), Timings(1.0, 2.0, 3.0))
-    new = [path for path in tmp_path.rglob("*") if path.is_file() and path not in before]
-    mark = tmp_path / GROUP_NAME / "complete" / "c" / "1"
-    assert mark in new
-    assert all(path.stat().st_mtime_ns <= mark.stat().st_mtime_ns for path in new)
+    new = files_of(tmp_path) - before
+    assert {path.relative_to(tmp_path / GROUP_NAME).parts[:3] for path in new} == {
+        (name, "c", "1") for name in ("maps", "reference", "record")
+    }
+    assert len(new) == 3
+    record = tmp_path / GROUP_NAME / "record" / "c" / "1" / "0"
+    assert all(path.stat().st_mtime_ns <= record.stat().st_mtime_ns for path in new)
     assert store.completed().tolist() == [False, True, False]
-    with pytest.raises(StoreError, match="only 1 of 3 views are baked"):
+    assert store.sample_bytes(1) == sum(path.stat().st_size for path in new)
+    with pytest.raises(StoreError, match="only 1 of 3 samples are baked"):
         store.require_complete()
 
 
 def test_a_write_that_is_killed_does_not_look_complete(tmp_path: Path) -> None:
     make_store(tmp_path)
-    # The process dies in the middle of its second view, after the maps and before the images.
+    # The process dies in the middle of its second sample, after the maps and before the images.
     script = f"""
 import os, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
@@ -196,7 +226,7 @@ store.write_view(1, *test_store.make_view(1), Timings(1, 2, 3))
     assert PemStore.open(tmp_path).completed().tolist() == [True, False, False]
 
 
-def test_overwriting_a_view_takes_its_mark_away_first(
+def test_overwriting_a_sample_takes_its_record_away_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = make_store(tmp_path)
@@ -205,17 +235,53 @@ def test_overwriting_a_view_takes_its_mark_away_first(
     def fail(*arguments: Any) -> Any:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mirrorbake.pem.store.split_pyramid", fail)
+    monkeypatch.setattr("mirrorbake.pem.layout.split_pyramid", fail)
     with pytest.raises(StoreError, match="No space left"):
         store.write_view(2, *make_view(2), Timings(1.0, 2.0, 3.0))
     assert store.completed().tolist() == [True, True, False]
+
+
+def test_two_writers_of_a_sample_write_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        fill(make_store(tmp_path / name))
+    a, b = (
+        {path.relative_to(tmp_path / name): path.read_bytes() for path in files_of(tmp_path / name)}
+        for name in ("a", "b")
+    )
+    assert a == b
+    fill(PemStore.open(tmp_path / "a", writable=True))
+    assert {path.relative_to(tmp_path / "a"): path.read_bytes() for path in files_of(tmp_path / "a")} == a
+
+
+def test_who_comes_second_to_create_a_pem_opens_the_first_ones(tmp_path: Path) -> None:
+    fill(make_store(tmp_path))
+    again = make_store(tmp_path)
+    assert again.completed().all()
+    assert [path.name for path in tmp_path.iterdir()] == [GROUP_NAME]
+
+
+def test_references_beyond_float16_are_clamped_and_counted_or_kept(tmp_path: Path) -> None:
+    maps, images = make_view(0)
+    bright = dataclasses.replace(images, object=images.object * np.float32(1e6))
+    (tmp_path / "half").mkdir()
+    (tmp_path / "full").mkdir()
+    half = make_store(tmp_path / "half")
+    expected = int((bright.object > 65504).sum())
+    assert expected > 0
+    assert half.write_view(0, maps, bright, Timings(1, 2, 3)) == expected
+    assert half.read_record(0)["clamped_reference"] == expected
+    assert half.read_images(0).object.max() == 65504
+    full = make_store(tmp_path / "full", precision="float32")
+    assert full.write_view(0, maps, bright, Timings(1, 2, 3)) == 0
+    np.testing.assert_array_equal(full.read_images(0).object, bright.object)
 
 
 def test_creation_that_fails_leaves_no_pem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*arguments: Any) -> Any:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mirrorbake.pem.store._put", fail)
+    monkeypatch.setattr("mirrorbake.pem.layout._put", fail)
     with pytest.raises(StoreError, match="No space left"):
         make_store(tmp_path)
     assert not PemStore.exists(tmp_path)
@@ -232,26 +298,211 @@ def test_what_is_not_a_pem_is_one_clear_error(tmp_path: Path) -> None:
         PemStore.open(tmp_path)
 
 
-def test_damage_is_reported_with_the_place(tmp_path: Path) -> None:
+def test_damaged_metadata_is_one_clear_error(tmp_path: Path) -> None:
     fill(make_store(tmp_path))
     metadata = tmp_path / GROUP_NAME / "zarr.json"
     intact = metadata.read_text()
-    for broken in ("", "{", intact[: len(intact) // 2], intact.replace('"map_size"', '"map_sise"')):
+    for broken in ("", "{", intact[: len(intact) // 2], "[]", "null", '{"zarr_format": 3}'):
         metadata.write_text(broken)
         with pytest.raises(StoreError, match="damaged, or not a PEM"):
             PemStore.open(tmp_path)
-    newer = json.loads(intact)
-    newer["attributes"]["mirrorbake"]["format_version"] = 99
-    metadata.write_text(json.dumps(newer))
-    with pytest.raises(StoreError, match="format version 99, this library reads 3"):
-        PemStore.open(tmp_path)
-    metadata.write_text(intact)
-    store = PemStore.open(tmp_path)
-    chunk = tmp_path / GROUP_NAME / "maps/lid/distant/finest/c/1/0/0/0/0"
-    chunk.write_bytes(chunk.read_bytes()[:10])
-    with pytest.raises(StoreError, match=r"damaged: maps/lid/distant/finest cannot be read"):
-        store.read_map("lid", "distant", 1)
-    store.read_map("lid", "distant", 0)
+    for version, advice in ((99, ""), (2, "bake it anew")):
+        other = json.loads(intact)
+        other["attributes"]["mirrorbake"]["format_version"] = version
+        metadata.write_text(json.dumps(other))
+        with pytest.raises(StoreError, match=f"format version {version}, this library reads 3.*{advice}"):
+            PemStore.open(tmp_path)
+
+
+HOSTILE: tuple[Any, ...] = (
+    None,
+    -1,
+    0,
+    2**63,
+    1e300,
+    float("nan"),
+    True,
+    "",
+    "../../etc",
+    [],
+    {},
+    [[]],
+    {"shape": "box"},
+)
+
+
+def test_any_edit_of_the_attributes_is_one_clear_error(tmp_path: Path) -> None:
+    make_store(tmp_path)
+    metadata = tmp_path / GROUP_NAME / "zarr.json"
+    intact = json.loads(metadata.read_text())
+    random = np.random.default_rng(5)
+    places = list(leaves(intact["attributes"]["mirrorbake"]))
+    tried = 0
+    for number in range(120):
+        path = places[random.integers(len(places))]
+        edited = json.loads(json.dumps(intact))
+        holder: Any = edited["attributes"]["mirrorbake"]
+        for step in path[:-1]:
+            holder = holder[step]
+        value = HOSTILE[number % len(HOSTILE)]
+        if type(holder[path[-1]]) is type(value) and holder[path[-1]] == value:
+            continue
+        if number % 4 == 0 and isinstance(holder, dict):
+            del holder[path[-1]]
+        else:
+            holder[path[-1]] = value
+        # Half of the edits come with the checksum that fits them: then the schema has to find them, or the
+        # fingerprint, unless they are values that might be.
+        if number % 2:
+            attributes = edited["attributes"]["mirrorbake"]
+            attributes["checksum"] = checksum_of(attributes)
+        metadata.write_text(json.dumps(edited))
+        tried += 1
+        if number % 2:
+            opens_or_says_why(tmp_path)
+        else:
+            with pytest.raises(StoreError) as caught:
+                PemStore.open(tmp_path)
+            assert "\n" not in str(caught.value)
+    assert tried > 75
+
+
+def opens_or_says_why(directory: Path) -> None:
+    # Anything but a StoreError fails the test.
+    with contextlib.suppress(StoreError):
+        verify(directory)
+
+
+def leaves(value: Any, path: tuple[Any, ...] = ()) -> Any:
+    if path:
+        yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield from leaves(inner, (*path, key))
+
+
+def test_hostile_arrays_are_refused_before_they_are_read(tmp_path: Path) -> None:
+    fill(make_store(tmp_path))
+    metadata = tmp_path / GROUP_NAME / "maps" / "zarr.json"
+    intact = metadata.read_text()
+    for key, value in (
+        ("shape", [3, 3, 510, 10**15]),
+        ("shape", [-1, 3, 510, 4]),
+        ("shape", [3]),
+        ("shape", "many"),
+        ("data_type", "float64"),
+        ("data_type", "string"),
+        ("codecs", []),
+        ("codecs", [{"name": "../../x"}]),
+        ("chunk_grid", {"name": "regular", "configuration": {"chunk_shape": [1, 1, 1, 1]}}),
+    ):
+        edited = json.loads(intact)
+        edited[key] = value
+        metadata.write_text(json.dumps(edited))
+        with pytest.raises(StoreError, match="damaged"):
+            PemStore.open(tmp_path).read_map("body", "local", 0)
+        assert verify(tmp_path).damaged == (0, 1, 2)
+
+
+def test_every_flipped_bit_and_every_lost_object_is_found(tmp_path: Path) -> None:
+    fill(make_store(tmp_path))
+    assert verify(tmp_path).is_sound
+    random = np.random.default_rng(3)
+    chunks = sorted(path for path in files_of(tmp_path / GROUP_NAME) if path.name != "zarr.json")
+    # Shared arrays, and three objects for each of three samples.
+    assert len(chunks) == 2 + 9
+    for number in range(44):
+        path = chunks[number % len(chunks)]
+        content = path.read_bytes()
+        damaged = bytearray(content)
+        if number < 33:
+            damaged[random.integers(len(content))] ^= 1 << random.integers(8)
+            path.write_bytes(damaged)
+        elif number % 2:
+            path.write_bytes(content[: random.integers(len(content))])
+        else:
+            path.unlink()
+        verdict = verify(tmp_path)
+        assert not verdict.is_sound, f"{path}, try {number}"
+        assert len(verdict.problems) + len(verdict.missing) == 1
+        assert all("damaged" in problem for problem in verdict.problems)
+        path.write_bytes(content)
+    assert verify(tmp_path).is_sound
+
+
+def test_parts_may_share_a_map(tmp_path: Path) -> None:
+    header = make_header()
+    body, lid = header.parts
+    shared = dataclasses.replace(body.shells[-1], map="shared distant")
+    parts = (
+        dataclasses.replace(body, shells=(body.shells[0], shared)),
+        dataclasses.replace(lid, shells=(shared,)),
+    )
+    store = make_store(tmp_path, parts=parts)
+    assert [entry.name for entry in store.header.maps] == ["body/local", "shared distant"]
+    fill(store)
+    np.testing.assert_array_equal(store.read_map("body", "distant", 1), store.read_map("lid", "distant", 1))
+    assert PemStore.open(tmp_path).header == store.header
+
+
+def test_a_pem_lies_on_an_object_store_as_on_a_disk(tmp_path: Path) -> None:
+    url = f"memory://pem-{tmp_path.name}"
+    with pytest.raises(StoreError, match="holds no PEM"):
+        PemStore.open(url)
+    fill(make_store(url))
+    fill(make_store(tmp_path))
+    assert verify(url).is_sound
+    for name in make_header().map_names():
+        np.testing.assert_array_equal(
+            PemStore.open(url).read_map(*name, 2), PemStore.open(tmp_path).read_map(*name, 2)
+        )
+    with pytest.raises(StoreError, match="is a URL"):
+        _ = PemStore.open(url).directory
+
+
+def test_a_pem_is_read_from_a_web_server(tmp_path: Path) -> None:
+    fill(make_store(tmp_path))
+
+    class Server(http.server.BaseHTTPRequestHandler):
+        """As any static host: whole files and ranges of bytes."""
+
+        def do_HEAD(self) -> None:
+            self.answer(body=False)
+
+        def do_GET(self) -> None:
+            self.answer(body=True)
+
+        def answer(self, *, body: bool) -> None:
+            path = tmp_path / self.path.lstrip("/")
+            if not path.is_file():
+                self.send_error(404)
+                return
+            content = path.read_bytes()
+            wanted = re.fullmatch(r"bytes=(\d*)-(\d*)", self.headers.get("Range", ""))
+            if wanted:
+                first = int(wanted[1]) if wanted[1] else len(content) - int(wanted[2])
+                last = int(wanted[2]) if wanted[1] and wanted[2] else len(content) - 1
+                part = content[first : last + 1]
+                self.send_response(206)
+                self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(content)}")
+            else:
+                part = content
+                self.send_response(200)
+            self.send_header("Content-Length", str(len(part)))
+            self.end_headers()
+            if body:
+                self.wfile.write(part)
+
+        def log_message(self, *arguments: Any) -> None:
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Server) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        store = PemStore.open(f"http://127.0.0.1:{server.server_address[1]}")
+        np.testing.assert_array_equal(
+            store.read_map("lid", "distant", 1), PemStore.open(tmp_path).read_map("lid", "distant", 1)
+        )
+        server.shutdown()
 
 
 def test_the_fingerprint_follows_contents_and_not_places() -> None:
@@ -277,9 +528,14 @@ def test_the_fingerprint_covers_what_was_decided(tmp_path: Path) -> None:
     assert make_header(plan=make_plan(samples=8)).fingerprint != make_header().fingerprint
     path = make_store(tmp_path).directory / GROUP_NAME / "zarr.json"
     text = path.read_text()
-    changed = text.replace('"value": 4', '"value": 8')
-    assert changed != text
-    path.write_text(changed)
+    changed = json.loads(text.replace('"value": 4', '"value": 8'))
+    attributes = changed["attributes"]["mirrorbake"]
+    assert attributes != json.loads(text)["attributes"]["mirrorbake"]
+    path.write_text(json.dumps(changed))
+    with pytest.raises(StoreError, match="do not match their checksum"):
+        PemStore.open(tmp_path)
+    attributes["checksum"] = checksum_of(attributes)
+    path.write_text(json.dumps(changed))
     with pytest.raises(StoreError, match="does not match its fingerprint"):
         PemStore.open(tmp_path)
 

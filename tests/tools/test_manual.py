@@ -19,7 +19,18 @@ COMMANDS = [
     *(f"mb-fresnel {command}" for command in ("table", "plot", "metal", "report")),
     *(
         f"mirrorbake {command}"
-        for command in ("bake", "analyze", "evaluate", "report", "render", "export", "view", "demo")
+        for command in (
+            "bake",
+            "analyze",
+            "evaluate",
+            "report",
+            "info",
+            "render",
+            "verify",
+            "export",
+            "view",
+            "demo",
+        )
     ),
     *("mirrorbake study fresnel", "mirrorbake study proxy"),
 ]
@@ -39,7 +50,7 @@ def help_of(command: str) -> str:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_option_is_in_the_manual(command: str) -> None:
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", help_of(command))) - {"--help"}
-    assert options, command
+    assert options or command == "mirrorbake verify", command
     section = MANUAL.split(f"\n## {command.split()[0]}\n")[-1].split("\n## ")[0]
     if command.startswith("mirrorbake"):
         section = MANUAL.split("\n## ")[0]

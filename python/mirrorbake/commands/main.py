@@ -16,6 +16,7 @@ from mirrorbake.commands.bake import bake_command
 from mirrorbake.commands.demo import demo_command
 from mirrorbake.commands.evaluate import evaluate_command
 from mirrorbake.commands.export import export_command
+from mirrorbake.commands.info import info_command, verify_command
 from mirrorbake.commands.render import render_command
 from mirrorbake.commands.report import report_command
 from mirrorbake.commands.study import app as study_app
@@ -35,6 +36,8 @@ app.command("report")(report_command)
 app.command("render")(render_command)
 app.command("export")(export_command)
 app.command("view")(view_command)
+app.command("info")(info_command)
+app.command("verify")(verify_command)
 app.command("demo")(demo_command)
 app.add_typer(study_app, name="study")
 

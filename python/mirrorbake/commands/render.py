@@ -16,12 +16,24 @@ from mirrorbake.commands.options import (
 from mirrorbake.commands.progress import messages
 
 
+def _parse_point(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(",") if text.strip())
+    except ValueError:
+        raise typer.BadParameter(f"{text!r}: expected numbers, separated by commas") from None
+
+
 @reports_errors
 def render_command(
     directory: Folder,
     view: Annotated[
-        float,
-        typer.Option("--view", metavar="T", help="Parameter of the arc, from 0 to 1.", show_default=False),
+        str,
+        typer.Option(
+            "--view",
+            metavar="T",
+            help="Point of the parameter space: 0 to 1 along an arc; azimuth,elevation of a dome.",
+            show_default=False,
+        ),
     ],
     out: Annotated[
         Path,
@@ -31,9 +43,9 @@ def render_command(
     ],
     threads: Threads = 0,
 ) -> None:
-    """Draw a PEM at any parameter of its arc, blended between the neighbouring views."""
+    """Draw a PEM at any point of its parameter space, blended between the neighbouring samples."""
     from mirrorbake.pem.render import render
 
     with _core.ThreadLimit(threads):
-        render(directory, view, out)
+        render(directory, _parse_point(view), out)
     messages.print(f"wrote {out}", markup=False, soft_wrap=True)

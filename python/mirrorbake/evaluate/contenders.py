@@ -157,7 +157,7 @@ class SingleLayer:
         ]
         parts = [[_core.ShellMap(self._proxy, self._layout, texels)] for texels in maps]
         return self._pem.run_time.render_parts(
-            parts, frame.samples(run_time), run_time_of(self._pem, run_time)
+            parts, frame.samples(run_time), frame.view.point, run_time_of(self._pem, run_time)
         )
 
     def _infer(self, index: int) -> list[FloatArray]:

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+import platform
+from dataclasses import asdict, dataclass
+from importlib import metadata
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from mirrorbake import _core
 from mirrorbake.pem.pyramid import coarser_sizes
+from mirrorbake.pem.schema import FORMAT_VERSION, checksum_of
+from mirrorbake.pem.shells import MapEntry, Part, Shell, maps_of
 from mirrorbake.scene.parameters import ParameterSpace
 from mirrorbake.scene.plan import Plan
 
@@ -16,7 +23,8 @@ if TYPE_CHECKING:
 
     from mirrorbake.scene.inputs import Inputs
 
-FORMAT_VERSION = 3
+RECORD = ("trace_s", "build_s", "solve_s", "clamped_maps", "clamped_reference")
+MAP_RECORD = ("iterations", "gradient", "converged")
 
 
 @dataclass(frozen=True)
@@ -82,24 +90,26 @@ class Header:
     """What was decided before the bake; a resumed one keeps to it."""
     space: ParameterSpace
     """At whose nodes the maps are."""
-    parts: list[dict[str, Any]]
-    """Per part of the reflector, in order: name, and layers as {layer name: proxy}."""
+    parts: tuple[Part, ...]
+    """Of the reflector, in order."""
     static: dict[str, Any]
     """Proxies of the static maps: `infinite`, and `proxy`: the distant layer's, None if that is infinite."""
     map_size: int
     precision: Literal["float16", "float32"]
     image_size: tuple[int, int]
     """Pixels: width, height."""
+    run_time: dict[str, Any]
+    """For what the maps were inferred: name, lookups per pixel, footprint_scale in pixels."""
 
     @property
     def fingerprint(self) -> str:
         """Changes with everything that decides what a bake computes: its source and its plan."""
-        text = json.dumps([self.source.fingerprint, self.plan.to_json()], sort_keys=True)
+        text = json.dumps([self.source.fingerprint, self.plan.to_json(), self.run_time], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_attributes(self) -> dict[str, Any]:
         """Return the JSON-like value of the group's attribute."""
-        return {
+        attributes = {
             "format": "pem",
             "format_version": FORMAT_VERSION,
             "library": self.source.library,
@@ -108,35 +118,81 @@ class Header:
                 "world": "right-handed, +Y up, metres",
                 "radiance": "scene-linear, Rec.709 primaries",
                 "faces": "+X -X +Y -Y +Z -Z, OpenGL orientation, row 0 on top",
-                "residuals": "level l = mean of 2x2 blocks of level l-1, from `finest` down, plus residual",
+                "texels": "finest level (face, row, column), then the residuals of the coarser levels",
+                "residuals": "level l = mean of 2x2 blocks of level l-1, from the finest down, plus residual",
                 "level_sizes": [self.map_size, *coarser_sizes(self.map_size)],
+                "shells": "front to back, L = L0 + (1 - a0)(L1 + (1 - a1)(...)); RGBA premultiplied by a",
+                "reference": "R G B of the object, its coverage, R G B of the background times the rest",
             },
             "map_size": self.map_size,
             "precision": self.precision,
             "image_size": list(self.image_size),
             "space": self.space.to_attributes(),
-            "parts": self.parts,
+            "parts": [asdict(part) | {"shells": [asdict(s) for s in part.shells]} for part in self.parts],
+            "maps": [asdict(entry) for entry in self.maps],
             "static": self.static,
+            "run_time": self.run_time,
+            "record": list(self.record_columns),
             "config": self.source.config,
             "plan": self.plan.to_json(),
             "inputs": self.source.inputs,
+            "provenance": provenance(),
         }
+        return {**attributes, "checksum": checksum_of(attributes)}
 
     @staticmethod
     def from_attributes(attributes: Mapping[str, Any]) -> Header:
-        """Inverse of `to_attributes`. Raises KeyError or TypeError for what is not one."""
+        """Inverse of `to_attributes`, for attributes that `check_attributes` has checked.
+
+        Raises KeyError or TypeError where the plan is none.
+        """
         width, height = attributes["image_size"]
+        parts = (
+            Part(part["name"], tuple(Shell(**shell) for shell in part["shells"]))
+            for part in attributes["parts"]
+        )
         return Header(
             source=Source(attributes["library"], attributes["config"], attributes["inputs"]),
             plan=Plan.from_json(attributes["plan"]),
             space=ParameterSpace.from_attributes(attributes["space"]),
-            parts=attributes["parts"],
+            parts=tuple(parts),
             static=attributes["static"],
             map_size=attributes["map_size"],
             precision=attributes["precision"],
             image_size=(width, height),
+            run_time=attributes["run_time"],
         )
 
+    @property
+    def maps(self) -> tuple[MapEntry, ...]:
+        """The maps of every sample, in the order in which they are stored."""
+        return maps_of(self.parts)
+
+    @property
+    def record_columns(self) -> tuple[str, ...]:
+        """What is recorded of every sample: seconds, clamped values, and a report for each map."""
+        return (*RECORD, *(f"{key}: {entry.name}" for entry in self.maps for key in MAP_RECORD))
+
     def map_names(self) -> list[tuple[str, str]]:
-        """(part, layer) of every map of a view."""
-        return [(part["name"], layer) for part in self.parts for layer in part["layers"]]
+        """(part, shell) of every map that a sample is drawn from; a shared one counts for each part."""
+        return [(part.name, shell.name) for part in self.parts for shell in part.shells]
+
+    def map_of(self, part: str, shell: str) -> int:
+        """Number of the map of a part's shell, in the order of `maps`; KeyError if there is none."""
+        for one in self.parts:
+            found = one.shell(shell) if one.name == part else None
+            if found is not None:
+                return [entry.name for entry in self.maps].index(found.map)
+        raise KeyError(f"{part}/{shell}")
+
+
+def provenance() -> dict[str, str]:
+    """Return the versions that a PEM was made with."""
+    return {
+        "mirrorbake": _core.version(),
+        "numpy": np.__version__,
+        "zarr": metadata.version("zarr"),
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "instructions": _core.active_isa(),
+    }

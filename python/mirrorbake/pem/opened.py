@@ -16,6 +16,7 @@ from mirrorbake.scene.stage import Stage, prepare_stage
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from mirrorbake.pem.location import Location
     from mirrorbake.scene.config import SceneConfig
     from mirrorbake.scene.parameters import ParameterSpace
 
@@ -34,13 +35,13 @@ class OpenedPem:
         return self.store.header.space
 
 
-def open_pem(directory: Path, stage: Stage | None = None) -> OpenedPem:
+def open_pem(directory: Location | Path | str, stage: Stage | None = None) -> OpenedPem:
     """Open a complete PEM and build its scene again, to look at it from new views.
 
     Parameters
     ----------
     directory
-        Where the PEM is.
+        Where the PEM is: a folder, or a URL.
     stage
         Its scene, if it has been prepared already.
 
@@ -61,8 +62,8 @@ def open_pem(directory: Path, stage: Stage | None = None) -> OpenedPem:
 def unchanged_config(store: PemStore) -> SceneConfig:
     """Return the scene that a PEM was baked from; raises StoreError and InputError as `open_pem` does."""
     source = store.header.source
-    config = parse_config(source.config, str(store.directory))
+    config = parse_config(source.config, str(store.location))
     present = Source(source.library, source.config, hash_inputs(config))
     if present.fingerprint != source.fingerprint:
-        raise StoreError(f"{store.directory}: its scene has changed ({present.difference_from(source)})")
+        raise StoreError(f"{store.location}: its scene has changed ({present.difference_from(source)})")
     return config

@@ -9,6 +9,8 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.proxy import proxy_from_attributes
+from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
+    from mirrorbake.pem.shells import Part
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.parameters import PointLike
 
@@ -58,7 +61,8 @@ class RunTime:
     def __post_init__(self) -> None:
         self._header: Header = self.store.header
         self._layout = _core.CubePyramidLayout(self._header.map_size)
-        self._options = lookups_of(self._header.source.config["infer"]["footprint_scale"])
+        self._options = lookups_of(self._header.run_time["footprint_scale"])
+        self._config = parse_config(self._header.source.config, str(self.store.location))
         self._irradiance = self.store.read_irradiance()
         self._local_triangles = self.store.read_local_triangles()
         self._static = _core.build_cube_pyramid(self.store.read_capture())
@@ -100,39 +104,53 @@ class RunTime:
             Radiance (H, W, 3), the mean over the samples that see the reflector; 0 where there are none.
         """
         if contender == "pem":
-            parts = self._pem_parts(self._header.space.neighbours(point))
+            parts = self._pem_parts(point)
         else:
             parts = self._static_parts("infinite" if contender == "static_infinite" else "proxy")
-        return self.render_parts(parts, samples, model)
+        return self.render_parts(parts, samples, point, model)
 
     def render_parts(
         self,
         parts: list[list[_core.ShellMap]],
         samples: _core.SurfaceSamples,
+        point: PointLike,
         model: _core.RunTimeModel | None = None,
     ) -> FloatArray:
-        """Draw the reflector from maps of each part, with the PEM's diffuse layer; returns as `render`."""
-        diffuse = None
-        if self._irradiance is not None:
-            diffuse = _core.diffuse_from_irradiance(samples, self.triangles, self._irradiance)
+        """Draw the reflector from maps of each part, with the diffuse layer of a point; as `render`."""
+        diffuse, irradiance = None, self._diffuse_at(point)
+        if irradiance is not None:
+            diffuse = _core.diffuse_from_irradiance(samples, self.triangles, irradiance)
         image = _core.render_reflector(samples, parts, diffuse, model or self._options)
         coverage = image[..., 3:]
         return np.divide(image[..., :3], coverage, out=np.zeros_like(image[..., :3]), where=coverage > 0.0)
 
-    def _pem_parts(self, blend: list[tuple[int, float]]) -> list[list[_core.ShellMap]]:
+    def _pem_parts(self, point: PointLike) -> list[list[_core.ShellMap]]:
+        blend = self._header.space.neighbours(point)
         self._views = {i: self._views.get(i) or self._read_view(i) for i, _ in blend}
-        parts = []
-        for part in self._header.parts:
-            maps = {}
-            for layer in part["layers"]:
-                maps[layer] = blended([(self._views[i][part["name"], layer], share) for i, share in blend])
-            distant = proxy_from_attributes(part["layers"]["distant"])
-            shells = [_core.ShellMap(distant, self._layout, maps["distant"])]
-            if "local" in maps:
-                local = proxy_from_attributes(part["layers"]["local"])
-                shells.insert(0, _core.ShellMap(local, self._layout, maps["local"], self._local_triangles))
-            parts.append(shells)
-        return parts
+        pose = self._pose_at(point)
+        return [self._part_maps(part, blend, pose) for part in self._header.parts]
+
+    def _part_maps(self, part: Part, blend: list[tuple[int, float]], pose: Pose) -> list[_core.ShellMap]:
+        shells = []
+        for shell in part.shells:
+            texels = blended([(self._views[i][part.name, shell.name], share) for i, share in blend])
+            off_hull = self._local_triangles if shell.polygons == "off hull" else None
+            shells.append(_core.ShellMap(shell.proxy_at(pose), self._layout, texels, off_hull))
+        return shells
+
+    def _pose_at(self, point: PointLike) -> Pose:
+        space = self._header.space
+        return Pose.of(self._config, space.scene_coordinates(space.point(point)).get("motion", 0.0))
+
+    def _diffuse_at(self, point: PointLike) -> FloatArray | None:
+        if self.store.has_irradiance_per_sample and self._irradiance is not None:
+            shares = []
+            for index, weight in self._header.space.neighbours(point):
+                values = self.store.read_irradiance(index)
+                assert values is not None
+                shares.append((values, weight))
+            return blended(shares)
+        return self._irradiance
 
     def _read_view(self, index: int) -> dict[tuple[str, str], FloatArray]:
         maps = {name: self.store.read_map(*name, index) for name in self._header.map_names()}

@@ -1,135 +1,134 @@
-"""A parameterized environment map on disk: a Zarr v3 group, one chunk per view, readable by anyone.
+"""A parameterized environment map on disk: a Zarr v3 group, readable by anyone.
 
-`DIR/pem.zarr` holds, for N views and maps of S² texels a face:
+`DIR/pem.zarr` holds, for N samples and M maps of S² texels a face:
 
-=========================== ================= ======================================================
-array                       shape             holds
-=========================== ================= ======================================================
-`maps/PART/LAYER/finest`    (N, 6, S, S, C)   finest level; faces +X −X +Y −Y +Z −Z as in OpenGL
-`maps/PART/LAYER/residuals` (N, R, C)         coarser levels in turn, minus the decimated finest level
-`reference/object`          (N, H, W, 3)      ray-traced object: mean over the samples that see it
-`reference/coverage`        (N, H, W)         fraction of a pixel's samples that see the object
-`reference/background`      (N, H, W, 3)      what the other samples see, times their fraction
-`static/capture`            (6, S, S, 3)      traced from the object's centre, the object removed
-`diffuse/irradiance`        (V, 3)            W m⁻² at the object's vertices, if it has a diffuse layer
-`local_triangles`           (T,)              0: on the convex hull, no local layer; if that is split off
-`timings`                   (N, 3)            seconds spent tracing, building matrices, solving
-`complete`                  (N,)              1: every chunk of this view is there. Written last
-=========================== ================= ======================================================
+===================== =============== ================================================================
+array                 shape           holds
+===================== =============== ================================================================
+`maps`                (N, M, T, C)    every map of a sample: finest level, then residuals of the others
+`reference`           (N, H, W, 7)    ray traced: object R G B, its coverage, background R G B
+`record`              (N, K)          seconds, clamped values and the solver's report. Written last
+`diffuse/irradiance`  (1 or N, V, 3)  W m⁻² at the object's vertices, if it has a diffuse layer
+`static/capture`      (6, S, S, 3)    traced from the object's centre, the object removed
+`local_triangles`     (T,)            0: on the convex hull, where no shell for `off hull` is read
+===================== =============== ================================================================
 
-LAYER is `local` (RGBA, premultiplied by α) or `distant` (RGB). Row 0 is the top. A coarser level l, of
-(S >> l)² texels a face, is its residual plus the mean over each 2×2 block, repeated l times, of `finest`
-([PEM] §4). The group's attribute `mirrorbake` holds the format's version, the scene, its input files with
-their hashes, what was decided before the bake and why, the parameter of every view, and each part's proxy
-geometry and origins.
+A sample is one object of `maps`, of `reference` and of `record` each (Zarr's sharding codec; a map is a chunk
+within its sample's object), with checksums (crc32c). A sample counts once its record is there. C is 4 if any
+map is RGBA; opaque maps then hold α = 1. A coarser level l, of (S >> l)² texels a face, is its residual plus
+the mean over each 2×2 block, repeated l times, of the finest ([PEM] §4). The group's attribute `mirrorbake`
+holds the rest; `mirrorbake.pem.schema` says what.
 """
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import os
+import re
 import shutil
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zarr
-import zarr.errors
-from zarr.codecs import BloscCodec, BloscShuffle
 
 from mirrorbake.errors import StoreError
-from mirrorbake.pem.header import FORMAT_VERSION, Header
-from mirrorbake.pem.pyramid import LARGEST_HALF, join_pyramid, residual_texels, split_pyramid
+from mirrorbake.pem.header import MAP_RECORD, RECORD, Header
+from mirrorbake.pem.layout import (
+    ATTRIBUTE,
+    Contents,
+    SolverReport,
+    Timings,
+    fill_group,
+    sample_layouts,
+    stored_images,
+    stored_map,
+)
+from mirrorbake.pem.location import (
+    GROUP_NAME,
+    Location,
+    delete_key,
+    exclusive,
+    has_key,
+    list_keys,
+    rename_unless_there,
+    stored_bytes,
+)
+from mirrorbake.pem.pyramid import join_pyramid
+from mirrorbake.pem.schema import check_attributes
 from mirrorbake.pem.view_images import ViewImages
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
 
-GROUP_NAME = "pem.zarr"
-ATTRIBUTE = "mirrorbake"
+__all__ = ["GROUP_NAME", "Contents", "PemStore", "SolverReport", "Timings", "exclusive"]
 
-LAYER_CHANNELS: Mapping[str, int] = {"local": 4, "distant": 3}
-"""Channels of a map: RGBA of the local layer, RGB of the distant one."""
-
-
-@dataclass(frozen=True)
-class Timings:
-    """Seconds of wall-clock time that a view took."""
-
-    trace_s: float
-    build_s: float
-    solve_s: float
+_SAMPLE_ARRAYS = ("maps", "reference", "record")
 
 
 class PemStore:
-    """A PEM on disk; see the module's description for the arrays.
+    """A PEM; see the module's description for the arrays.
 
-    A view counts only when its mark in `complete`, which is written after everything else, is set: a bake
-    that is killed loses the view in flight and nothing more.
+    A sample counts only when its record, which is written after everything else, is there: a bake that is
+    killed loses the samples in flight and nothing more. Two processes that write the same sample write the
+    same bits.
     """
 
-    def __init__(self, directory: Path, group: zarr.Group, header: Header) -> None:
-        self.directory = directory
+    def __init__(self, location: Location, group: zarr.Group, header: Header) -> None:
+        self.location = location
         self.header = header
         self._group = group
 
+    @property
+    def directory(self) -> Path:
+        """The folder; StoreError for a URL."""
+        return self.location.path
+
     @staticmethod
-    def create(
-        directory: Path,
-        header: Header,
-        capture: FloatArray,
-        irradiance: FloatArray | None,
-        local_triangles: NDArray[np.uint8] | None = None,
-    ) -> PemStore:
-        """Make a PEM without views in an existing folder.
+    def create(place: Location | Path | str, contents: Contents) -> PemStore:
+        """Make a PEM without samples, or open one that another process has made meanwhile.
 
         Parameters
         ----------
-        directory
-            Holds no PEM yet. The group appears in it by a rename, once all its arrays exist.
-        header
-            Goes to the attributes.
-        capture
-            The static map's finest level, shape (6, S, S, 3).
-        irradiance
-            Diffuse layer, shape (V, 3), or None.
-        local_triangles
-            Shape (T,), 0 for triangles of the reflector that the local layers leave out, or None.
+        place
+            An existing folder, or a URL. In a folder the group appears by a rename, once all its arrays
+            exist; at a URL its attributes are written last.
+        contents
+            What all samples share; of a diffuse layer that is not the same for all, its shape.
 
         Raises
         ------
         StoreError
-            The folder cannot be written to.
+            It cannot be written to.
         """
-        partial = directory / f".{GROUP_NAME}.partial"
+        location = Location.of(place)
         try:
-            shutil.rmtree(partial, ignore_errors=True)
-            group = zarr.open_group(partial, mode="w-", zarr_format=3)
-            group.attrs[ATTRIBUTE] = header.to_attributes()
-            _create_arrays(group, header)
-            _put(group, "static/capture", capture, ("face", "row", "column", "channel"))
-            if irradiance is not None:
-                _put(group, "diffuse/irradiance", irradiance, ("vertex", "channel"))
-            if local_triangles is not None:
-                _put(group, "local_triangles", local_triangles, ("triangle",))
-            partial.rename(directory / GROUP_NAME)
+            if location.is_remote:
+                fill_group(location.store(writable=True), contents)
+            else:
+                name = location.partial_name
+                partial = location.path / name
+                try:
+                    store = location.store(writable=True, name=name)
+                    fill_group(store, contents)
+                    with contextlib.suppress(FileExistsError, NotADirectoryError):
+                        rename_unless_there(partial, location.path / GROUP_NAME)
+                finally:
+                    shutil.rmtree(partial, ignore_errors=True)
         except OSError as failure:
-            raise StoreError(f"{directory}: cannot write: {failure.strerror or failure}") from None
-        return PemStore.open(directory, writable=True)
+            raise StoreError(f"{location}: cannot write: {failure.strerror or failure}") from None
+        return PemStore.open(location, writable=True)
 
     @staticmethod
-    def exists(directory: Path) -> bool:
-        """Whether a folder holds a PEM, complete or not."""
-        return (directory / GROUP_NAME).is_dir()
+    def exists(place: Location | Path | str) -> bool:
+        """Whether a place holds a PEM, complete or not."""
+        return Location.of(place).exists()
 
     @staticmethod
-    def open(directory: Path, *, writable: bool = False) -> PemStore:
+    def open(place: Location | Path | str, *, writable: bool = False) -> PemStore:
         """Open a PEM.
 
         Raises
@@ -137,56 +136,83 @@ class PemStore:
         StoreError
             There is none, or it is damaged, or of a version that this library does not know.
         """
-        path = directory / GROUP_NAME
-        if not path.is_dir():
-            raise StoreError(
-                f"{directory}: holds no PEM (expected the folder {GROUP_NAME} that `bake` makes)"
-            )
+        location = Location.of(place)
+        if not location.exists():
+            raise StoreError(f"{location}: holds no PEM (expected the folder {GROUP_NAME} that `bake` makes)")
+        where = f"{location}/{GROUP_NAME}"
         try:
-            group = zarr.open_group(path, mode="r+" if writable else "r", zarr_format=3)
-            attributes = cast("Mapping[str, Any]", group.attrs[ATTRIBUTE])
-            version = attributes["format_version"]
-            if version != FORMAT_VERSION:
-                raise StoreError(f"{path}: format version {version}, this library reads {FORMAT_VERSION}")
-            header = Header.from_attributes(attributes)
-            if header.fingerprint != attributes["fingerprint"]:
-                raise StoreError(f"{path}: damaged: what it was made from does not match its fingerprint")
-        except (OSError, KeyError, TypeError, ValueError, zarr.errors.BaseZarrError) as failure:
-            if isinstance(failure, StoreError):
-                raise
-            raise StoreError(f"{path}: damaged, or not a PEM: {failure}") from None
-        return PemStore(directory, group, header)
+            group = zarr.open_group(
+                location.store(writable=writable), mode="r+" if writable else "r", zarr_format=3
+            )
+            attributes = dict(group.attrs).get(ATTRIBUTE)
+        except StoreError:
+            raise
+        # Metadata that is damaged makes zarr raise whatever its parsers raise.
+        except Exception as failure:
+            raise StoreError(f"{where}: damaged, or not a PEM: {failure}") from None
+        checked = check_attributes(attributes, where)
+        try:
+            header = Header.from_attributes(checked)
+        except (KeyError, TypeError, ValueError) as failure:
+            raise StoreError(f"{where}: damaged: the plan lacks {failure}") from None
+        if header.fingerprint != checked["fingerprint"]:
+            raise StoreError(f"{where}: damaged: what it was made from does not match its fingerprint")
+        return PemStore(location, group, header)
 
     def _array(self, name: str) -> zarr.Array[Any]:
+        where = f"{self.location}/{GROUP_NAME}"
         try:
             array = self._group[name]
         except KeyError:
-            raise StoreError(f"{self.directory / GROUP_NAME}: damaged: the array {name} is missing") from None
+            raise StoreError(f"{where}: damaged: the array {name} is missing") from None
+        except Exception as failure:
+            raise StoreError(f"{where}: damaged: {name}: {failure}") from None
         if not isinstance(array, zarr.Array):
-            raise StoreError(f"{self.directory / GROUP_NAME}: damaged: {name} is not an array")
+            raise StoreError(f"{where}: damaged: {name} is not an array")
+        layout = sample_layouts(self.header).get(name)
+        if layout is not None:
+            found = (array.shape, array.chunks, array.shards, str(array.dtype))
+            expected = (layout.shape, layout.chunk, layout.shard, layout.dtype)
+            if found != expected:
+                raise StoreError(f"{where}: damaged: {name} has the layout {found}, expected {expected}")
+        elif array.size > _MOST_VALUES or array.dtype.kind not in "fu":
+            raise StoreError(f"{where}: damaged: {name} has the shape {array.shape}")
         return array
 
     def _read(self, name: str, index: Any = ...) -> NDArray[Any]:
         # zarr reports a chunk that does not decode as whatever its codec raised: RuntimeError, ValueError,
-        # OSError.
+        # OSError, zlib.error.
         array = self._array(name)
+        where = f"{self.location}/{GROUP_NAME}"
         try:
+            if isinstance(index, int) and not has_key(self._group.store, _key(array, name, index)):
+                raise StoreError(f"{where}: damaged: sample {index} of {name} is missing")
+            if index is ... and not has_key(self._group.store, _key(array, name, 0)):
+                raise StoreError(f"{where}: damaged: {name} is missing")
             return np.asarray(array[index])
-        except (OSError, ValueError, RuntimeError) as failure:
-            raise StoreError(
-                f"{self.directory / GROUP_NAME}: damaged: {name} cannot be read: {failure}"
-            ) from None
+        except StoreError:
+            raise
+        except MemoryError:
+            raise
+        except Exception as failure:
+            at = f"sample {index} of {name}" if isinstance(index, int) else name
+            raise StoreError(f"{where}: damaged: {at} cannot be read: {failure}") from None
 
     def completed(self) -> NDArray[np.bool_]:
-        """Which views are there, shape (N,)."""
-        return self._read("complete").astype(bool)
+        """Which samples are there, shape (N,)."""
+        done = np.zeros(len(self.header.space), bool)
+        for key in list_keys(self._group.store, "record/c/"):
+            match = re.fullmatch(r"record/c/(\d{1,18})/0", key)
+            if match is not None and int(match[1]) < len(done):
+                done[int(match[1])] = True
+        return done
 
     def require_complete(self) -> None:
-        """Raise StoreError unless every view is there."""
+        """Raise StoreError unless every sample is there."""
         completed = self.completed()
         if not completed.all():
             raise StoreError(
-                f"{self.directory}: only {int(completed.sum())} of {completed.size} views are baked; "
+                f"{self.location}: only {int(completed.sum())} of {completed.size} samples are baked; "
                 "run `mirrorbake bake` again with the same scene to finish it"
             )
 
@@ -196,159 +222,169 @@ class PemStore:
         maps: Mapping[tuple[str, str], FloatArray],
         images: ViewImages,
         timings: Timings,
+        reports: Mapping[tuple[str, str], SolverReport] | None = None,
     ) -> int:
-        """Write one view, its mark last.
+        """Write one sample, its record last.
 
         Parameters
         ----------
         index
-            Of the view.
+            Of the sample.
         maps
-            One pyramid (texels, C) for each of the header's `map_names`.
+            One pyramid (texels, C) for each of the header's `map_names`; of those that share a map, any.
         images
             The ray-traced reference.
         timings
-            What the view took.
+            What the sample took.
+        reports
+            How the solving of each map ended, if it was solved.
 
         Returns
         -------
         int
-            How many values of the maps were clamped because float16 cannot hold them.
+            How many values were clamped because float16 cannot hold them.
 
         Raises
         ------
         StoreError
-            The disk cannot be written to.
+            It cannot be written to.
         """
+        header = self.header
+        layouts = sample_layouts(header)
+        texels = np.ones(layouts["maps"].shape[1:], header.precision)
+        record = np.zeros(len(header.record_columns))
         clamped = 0
         try:
-            self._array("complete")[index] = 0
-            for part, layer in self.header.map_names():
-                finest, residuals, count = split_pyramid(
-                    maps[part, layer], self.header.map_size, self.header.precision
-                )
+            self.forget(index)
+            for name in header.map_names():
+                number = header.map_of(*name)
+                values, count = stored_map(maps[name], header)
+                texels[number, :, : values.shape[1]] = values
                 clamped += count
-                self._array(f"maps/{part}/{layer}/finest")[index] = finest
-                self._array(f"maps/{part}/{layer}/residuals")[index] = residuals
-            for name, image in (
-                ("object", images.object),
-                ("coverage", images.coverage),
-                ("background", images.background),
-            ):
-                half = np.clip(image, -LARGEST_HALF, LARGEST_HALF).astype(np.float16)
-                self._array(f"reference/{name}")[index] = half
-            self._array("timings")[index] = np.array([timings.trace_s, timings.build_s, timings.solve_s])
-            self._array("complete")[index] = 1
+                report = (reports or {}).get(name, SolverReport(0, 0.0, True))
+                start = len(RECORD) + number * len(MAP_RECORD)
+                record[start : start + len(MAP_RECORD)] = (
+                    report.iterations,
+                    report.gradient,
+                    report.converged,
+                )
+            reference, clamped_reference = stored_images(images, header.precision)
+            record[: len(RECORD)] = (
+                timings.trace_s,
+                timings.build_s,
+                timings.solve_s,
+                clamped,
+                clamped_reference,
+            )
+            self._array("maps")[index] = texels
+            self._array("reference")[index] = reference
+            self._array("record")[index] = record
         except OSError as failure:
-            raise StoreError(f"{self.directory}: cannot write: {failure.strerror or failure}") from None
-        return clamped
+            raise StoreError(f"{self.location}: cannot write: {failure.strerror or failure}") from None
+        return clamped + clamped_reference
+
+    def forget(self, index: int) -> None:
+        """Take away the record of a sample, so that it counts as not baked."""
+        delete_key(self._group.store, f"record/c/{index}/0")
+
+    def write_irradiance(self, index: int, irradiance: FloatArray) -> None:
+        """Write the diffuse layer (V, 3) of one sample, where it is not the same for all."""
+        self._array("diffuse/irradiance")[index] = irradiance
 
     def read_map(self, part: str, layer: str, index: int) -> FloatArray:
-        """Pyramid of one map of one view, shape (texels, C), float32."""
-        name = f"maps/{part}/{layer}"
-        return join_pyramid(self._read(f"{name}/finest", index), self._read(f"{name}/residuals", index))
+        """Pyramid of the map of a part's shell in one sample, shape (texels, C), float32."""
+        number = self.header.map_of(part, layer)
+        channels, size = self.header.maps[number].channels, self.header.map_size
+        array = self._array("maps")
+        if not has_key(self._group.store, _key(array, "maps", index)):
+            raise StoreError(f"{self.location}/{GROUP_NAME}: damaged: sample {index} of maps is missing")
+        values = self._read("maps", (index, number))[:, :channels]
+        finest = values[: 6 * size * size].reshape(6, size, size, channels)
+        return join_pyramid(finest, values[6 * size * size :])
 
     def read_images(self, index: int) -> ViewImages:
-        """Ray-traced images of one view."""
-        return ViewImages(
-            *(
-                self._read(f"reference/{name}", index).astype(np.float32)
-                for name in ("object", "coverage", "background")
-            )
-        )
+        """Ray-traced images of one sample."""
+        values = self._read("reference", index).astype(np.float32)
+        return ViewImages(values[..., :3], values[..., 3], values[..., 4:])
+
+    def read_record(self, index: int) -> dict[str, float]:
+        """What was recorded of one sample, by the header's `record_columns`."""
+        values = self._read("record", index)
+        return dict(zip(self.header.record_columns, (float(value) for value in values), strict=True))
 
     def read_timings(self, index: int) -> Timings:
-        """What one view took."""
-        return Timings(*(float(value) for value in self._read("timings", index)))
+        """What one sample took."""
+        record = self.read_record(index)
+        return Timings(record["trace_s"], record["build_s"], record["solve_s"])
+
+    def contents(self) -> Contents:
+        """What all samples share; a diffuse layer of single samples is left out."""
+        irradiance = None if self.has_irradiance_per_sample else self.read_irradiance()
+        return Contents(
+            self.header,
+            self.read_capture(),
+            None if irradiance is None else irradiance[None],
+            self.read_local_triangles(),
+        )
 
     def read_capture(self) -> FloatArray:
         """Finest level of the static map, shape (6, S, S, 3)."""
         return self._read("static/capture").astype(np.float32)
 
-    def read_irradiance(self) -> FloatArray | None:
-        """Irradiance at the object's vertices, shape (V, 3), or None if it has no diffuse layer."""
+    def read_irradiance(self, index: int = 0) -> FloatArray | None:
+        """Irradiance at the object's vertices in one sample, shape (V, 3); None without a diffuse layer."""
         if "diffuse/irradiance" not in self._group:
             return None
-        return self._read("diffuse/irradiance").astype(np.float32)
+        return self._read("diffuse/irradiance", index if self.has_irradiance_per_sample else 0).astype(
+            np.float32
+        )
+
+    @property
+    def has_irradiance_per_sample(self) -> bool:
+        """Whether the diffuse layer changes from sample to sample."""
+        return self.header.space.changes_scene
 
     def read_local_triangles(self) -> NDArray[np.uint8] | None:
-        """Shape (T,): 0 for triangles that the local layers leave out; None if they cover all."""
+        """Shape (T,): 0 for triangles that shells for `off hull` leave out; None if there are none."""
         if "local_triangles" not in self._group:
             return None
         return self._read("local_triangles").astype(np.uint8)
 
+    def sample_bytes(self, index: int) -> int:
+        """Bytes that a sample takes."""
+        names = [*_SAMPLE_ARRAYS]
+        if "diffuse/irradiance" in self._group and self.has_irradiance_per_sample:
+            names.append("diffuse/irradiance")
+        return sum(stored_bytes(self._group.store, _key(self._array(name), name, index)) for name in names)
+
+    def array_names(self) -> list[str]:
+        """Names of the arrays that are not of single samples."""
+        names = ["static/capture", "local_triangles"]
+        if not self.has_irradiance_per_sample:
+            names.append("diffuse/irradiance")
+        return [name for name in names if name in self._group]
+
+    def check_array(self, name: str) -> None:
+        """Read a whole array; StoreError where it is damaged."""
+        self._read(name, 0 if name == "diffuse/irradiance" else ...)
+
+    def check_sample(self, index: int) -> None:
+        """Read all of a sample; StoreError where it is damaged."""
+        for name in _SAMPLE_ARRAYS:
+            self._read(name, index)
+        if "diffuse/irradiance" in self._group and self.has_irradiance_per_sample:
+            self._read("diffuse/irradiance", index)
+
     def remove_stray_files(self) -> None:
-        """Remove what a killed write left behind."""
+        """Remove what a killed write left behind in a folder."""
+        if self.location.is_remote:
+            return
         for stray in (self.directory / GROUP_NAME).rglob("*.partial"):
             stray.unlink(missing_ok=True)
 
 
-@contextlib.contextmanager
-def exclusive(directory: Path) -> Iterator[None]:
-    """Hold a folder's lock, which ends with the process however it dies.
-
-    Raises
-    ------
-    StoreError
-        Another process holds it.
-    """
-    handle = os.open(directory, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise StoreError(f"{directory}: another bake is writing to it") from None
-        yield
-    finally:
-        os.close(handle)
+_MOST_VALUES = 1 << 31
 
 
-def _compressor(dtype: str) -> BloscCodec:
-    return BloscCodec(cname="zstd", clevel=3, shuffle=BloscShuffle.shuffle, typesize=np.dtype(dtype).itemsize)
-
-
-def _create_arrays(group: zarr.Group, header: Header) -> None:
-    views, size = len(header.space), header.map_size
-    width, height = header.image_size
-
-    def create(name: str, shape: tuple[int, ...], dtype: str, dimensions: tuple[str, ...]) -> None:
-        group.create_array(
-            name,
-            shape=(views, *shape),
-            chunks=(1, *shape),
-            dtype=dtype,
-            fill_value=0,
-            compressors=_compressor(dtype),
-            dimension_names=("view", *dimensions),
-        )
-
-    for part, layer in header.map_names():
-        channels = LAYER_CHANNELS[layer]
-        name = f"maps/{part}/{layer}"
-        create(
-            f"{name}/finest",
-            (6, size, size, channels),
-            header.precision,
-            ("face", "row", "column", "channel"),
-        )
-        create(f"{name}/residuals", (residual_texels(size), channels), header.precision, ("texel", "channel"))
-    create("reference/object", (height, width, 3), "float16", ("row", "column", "channel"))
-    create("reference/coverage", (height, width), "float16", ("row", "column"))
-    create("reference/background", (height, width, 3), "float16", ("row", "column", "channel"))
-    create("timings", (3,), "float64", ("stage",))
-    create("complete", (), "uint8", ())
-
-
-def _put(
-    group: zarr.Group, name: str, data: FloatArray | NDArray[np.uint8], dimensions: tuple[str, ...]
-) -> None:
-    array = group.create_array(
-        name,
-        shape=data.shape,
-        chunks=data.shape,
-        dtype=data.dtype.name,
-        fill_value=0,
-        compressors=_compressor(data.dtype.name),
-        dimension_names=dimensions,
-    )
-    array[...] = data
+def _key(array: zarr.Array[Any], name: str, index: int) -> str:
+    return "/".join([name, "c", str(index), *("0" for _ in array.shape[1:])])

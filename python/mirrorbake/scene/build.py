@@ -19,6 +19,7 @@ from mirrorbake.scene.config import (
     Surroundings,
 )
 from mirrorbake.scene.parameters import ParameterSpace, Point, format_point, space_of
+from mirrorbake.scene.pose import Pose, rotation_matrix
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,45 +48,6 @@ class BuiltScene:
     space: ParameterSpace
     notes: list[str]
     """What the user should know about the inputs, such as values that had to be changed."""
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Where the object has moved to, as a function of its coordinate; lengths in metres."""
-
-    offset: NDArray[np.float64]
-    """(3,) that it has moved."""
-    turned: float
-    """Degrees about the vertical through `pivot`."""
-    pivot: NDArray[np.float64]
-    """(3,) the centre of the object's base at rest."""
-
-    @staticmethod
-    def of(config: SceneConfig, coordinate: float) -> Pose:
-        """Return the pose at a coordinate of [motion]; at rest without that section."""
-        pivot = np.array(config.reflector.position)
-        if config.motion is None:
-            return Pose(np.zeros(3), 0.0, pivot)
-        return Pose(coordinate * np.array(config.motion.to), coordinate * config.motion.turn, pivot)
-
-    @property
-    def rotation(self) -> NDArray[np.float64]:
-        """The matrix (3, 3) of the turn."""
-        return rotation_matrix((0.0, self.turned, 0.0))
-
-    def moved(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return points (..., 3) that move with the object."""
-        if not self.turned and not self.offset.any():
-            return points
-        moved: NDArray[np.float64] = (points - self.pivot) @ self.rotation.T + self.pivot + self.offset
-        return moved
-
-    def at_rest(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Inverse of `moved`."""
-        if not self.turned and not self.offset.any():
-            return points
-        rest: NDArray[np.float64] = (points - self.offset - self.pivot) @ self.rotation + self.pivot
-        return rest
 
 
 def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
@@ -178,16 +140,6 @@ def winding_number(positions: FloatArray, triangles: NDArray[np.uint32], point: 
         + np.einsum("ij,ij->i", c, a) * lb
     )
     return float(np.sum(2.0 * np.arctan2(numerator, denominator)) / (4.0 * math.pi))
-
-
-def rotation_matrix(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Rotate about x, then y, then z: the matrix `world_from_object`, shape (3, 3)."""
-    (sx, cx), (sy, cy), (sz, cz) = ((math.sin(math.radians(d)), math.cos(math.radians(d))) for d in degrees)
-    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    rotation: NDArray[np.float64] = about_z @ about_y @ about_x
-    return rotation
 
 
 def _vector(v: tuple[float, float, float]) -> str:

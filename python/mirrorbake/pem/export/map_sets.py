@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from mirrorbake import _core
 from mirrorbake.errors import OptionError
+from mirrorbake.pem.shells import moved_proxy
+from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
@@ -67,7 +70,7 @@ def static_set(store: PemStore) -> MapSet:
     header = store.header
     proxy = header.static["proxy"] or header.static["infinite"]
     shell = ShellMap("static", proxy, header.map_size, _core.build_cube_pyramid(store.read_capture()))
-    return MapSet("static", None, {part["name"]: [shell] for part in header.parts})
+    return MapSet("static", None, {part.name: [shell] for part in header.parts})
 
 
 def sample_set(store: PemStore, index: int) -> MapSet:
@@ -82,10 +85,18 @@ def sample_set(store: PemStore, index: int) -> MapSet:
     count = len(header.space)
     if not 0 <= index < count:
         raise OptionError(f"sample = {index}: expected 0 to {count - 1}")
+    config = parse_config(header.source.config, str(store.location))
+    place = header.space.scene_coordinates(header.space.sample(index))
+    pose = Pose.of(config, place.get("motion", 0.0))
     parts = {
-        part["name"]: [
-            ShellMap(name, proxy, header.map_size, store.read_map(part["name"], name, index))
-            for name, proxy in part["layers"].items()
+        part.name: [
+            ShellMap(
+                shell.name,
+                moved_proxy(shell.proxy, pose) if shell.moves else shell.proxy,
+                header.map_size,
+                store.read_map(part.name, shell.name, index),
+            )
+            for shell in part.shells
         ]
         for part in header.parts
     }

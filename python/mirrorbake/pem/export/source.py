@@ -73,10 +73,10 @@ def export_source(pem: OpenedPem) -> ExportSource:
     header, built = store.header, stage.built
     parts = tuple(
         Part(
-            part["name"],
+            part.name,
             tuple(
-                Shell(name, proxy, header.map_size, opaque=number == len(part["layers"]) - 1)
-                for number, (name, proxy) in enumerate(part["layers"].items())
+                Shell(shell.name, shell.proxy, header.map_size, opaque=shell is part.shells[-1])
+                for shell in part.shells
             ),
         )
         for part in header.parts

@@ -1,0 +1,152 @@
+"""Where a PEM lies: a folder, or an object store behind a URL."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import re
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import zarr.storage
+from zarr.core.sync import sync
+
+from mirrorbake.errors import StoreError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from zarr.abc.store import Store
+
+GROUP_NAME = "pem.zarr"
+_URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Location:
+    """A folder of the file system, or a URL that fsspec knows: `memory://`, `s3://`, `https://`."""
+
+    text: str
+    """As the user wrote it."""
+
+    @staticmethod
+    def of(place: Location | Path | str) -> Location:
+        """Return a location."""
+        return place if isinstance(place, Location) else Location(str(place))
+
+    @property
+    def is_remote(self) -> bool:
+        """Whether it is a URL."""
+        return _URL.match(self.text) is not None
+
+    @property
+    def path(self) -> Path:
+        """The folder.
+
+        Raises
+        ------
+        StoreError
+            It is a URL.
+        """
+        if self.is_remote:
+            raise StoreError(f"{self.text}: is a URL; expected a folder of this machine's file system")
+        return Path(self.text)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def store(self, *, writable: bool, name: str = GROUP_NAME) -> Store:
+        """Return the Zarr store of the PEM's group.
+
+        Raises
+        ------
+        StoreError
+            The URL is of a kind that is not installed, or not known.
+        """
+        if not self.is_remote:
+            return zarr.storage.LocalStore(self.path / name, read_only=not writable)
+        try:
+            return zarr.storage.FsspecStore.from_url(
+                f"{self.text.rstrip('/')}/{name}", read_only=not writable
+            )
+        # What it raises depends on the kind of URL: ImportError, ValueError, errors of cloud libraries.
+        except Exception as failure:
+            raise StoreError(
+                f"{self.text}: cannot open: {failure} (URLs need `pip install mirrorbake[remote]`)"
+            ) from None
+
+    def exists(self) -> bool:
+        """Whether there is a PEM, complete or not."""
+        if not self.is_remote:
+            return (self.path / GROUP_NAME).is_dir()
+        return has_key(self.store(writable=False), "zarr.json")
+
+    @property
+    def partial_name(self) -> str:
+        """A name for the group while it is made, which no other process uses."""
+        return f".{GROUP_NAME}.{uuid.uuid4().hex}.partial"
+
+
+def has_key(store: Store, key: str) -> bool:
+    """Whether a store has an object."""
+    return bool(sync(store.exists(key)))
+
+
+def list_keys(store: Store, prefix: str) -> list[str]:
+    """Return the keys of all objects whose key starts so."""
+
+    async def collect() -> list[str]:
+        return [key async for key in store.list_prefix(prefix)]
+
+    return sync(collect())
+
+
+def delete_key(store: Store, key: str) -> None:
+    """Remove an object, if it is there."""
+    sync(store.delete(key))
+
+
+def stored_bytes(store: Store, key: str) -> int:
+    """Size of an object in bytes."""
+    size: Any = sync(store.getsize(key))
+    return int(size)
+
+
+@contextlib.contextmanager
+def exclusive(directory: Path, *, shared: bool = False) -> Iterator[None]:
+    """Hold a folder's lock, which ends with the process however it dies.
+
+    Parameters
+    ----------
+    directory
+        The folder.
+    shared
+        Allow others that hold it shared, too: bakes of single samples.
+
+    Raises
+    ------
+    StoreError
+        Another process holds it.
+    """
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise StoreError(f"{directory}: another bake is writing to it") from None
+        yield
+    finally:
+        os.close(handle)
+
+
+def rename_unless_there(source: Path, target: Path) -> None:
+    """Rename a folder, unless another process has put one there first."""
+    try:
+        source.rename(target)
+    except OSError:
+        # A folder that is not empty cannot be renamed over: another process was first.
+        if not target.is_dir():
+            raise

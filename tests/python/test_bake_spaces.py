@@ -1,0 +1,227 @@
+"""Bakes over every kind of parameter space, in pieces, on workers, killed and damaged."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from mirrorbake import _core
+from mirrorbake.bake.bake import bake
+from mirrorbake.errors import InputError, OptionError, StoreError
+from mirrorbake.evaluate.metrics import psnr
+from mirrorbake.pem.opened import open_pem
+from mirrorbake.pem.render import render
+from mirrorbake.pem.store import PemStore
+from mirrorbake.pem.verify import verify
+from mirrorbake.pem.view_images import images_of_trace
+from mirrorbake.scene.load import parse_config
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from mirrorbake.bake.estimate import Estimate
+    from mirrorbake.scene.config import SceneConfig
+
+# Small enough for a second a sample.
+TINY: dict[str, Any] = {
+    "reflector": {"object": "teapot", "subdivisions": 8},
+    "maps": {"size": 32, "distant": "infinite"},
+    "trace": {"samples": 4, "depth": 2, "indirect": "none"},
+    "layers": {"local": True, "hull_split": True},
+}
+DOME = {"kind": "dome", "start": 20, "degrees": 20, "count": 2, "rings": 2, "elevation": [15, 35]}
+
+
+def sky(folder: Path) -> str:
+    v, u = np.mgrid[0:32, 0:64].astype(np.float32)
+    pixels = np.stack([u / 64, 1 - v / 32, 1 - u / 64], axis=-1)
+    pixels[6:9, 20:23] = 8.0
+    path = folder / "sky.exr"
+    _core.save_image(str(path), np.ascontiguousarray(pixels), ["R", "G", "B"])
+    return str(path)
+
+
+def scene(folder: Path, views: dict[str, Any], **sections: Any) -> SceneConfig:
+    sizes = {"size": [64, 48], **views}
+    return parse_config(
+        {**TINY, "surroundings": {"panorama": sky(folder)}, "views": sizes, **sections}, "scene"
+    )
+
+
+def objects(directory: Path) -> dict[str, bytes]:
+    """Maps and references of a PEM, by file; seconds are not the same in any two runs."""
+    group = directory / "pem.zarr"
+    return {
+        str(path.relative_to(group)): path.read_bytes()
+        for name in ("maps", "reference", "diffuse")
+        for path in sorted((group / name).rglob("*"))
+        if path.is_file() and path.name != "zarr.json"
+    }
+
+
+@pytest.mark.parametrize("kind", ["dome", "motion", "light"])
+def test_a_pem_over_any_space_is_good_on_its_samples_and_between_them(kind: str, tmp_path: Path) -> None:
+    material = {"fresnel": "schlick", "r0": 0.5, "albedo": 0.3}
+    fixed = {"kind": "fixed", "start": 20}
+    config = {
+        "dome": lambda: scene(tmp_path, DOME),
+        # A body with a diffuse layer, whose light changes as it moves.
+        "motion": lambda: scene(
+            tmp_path, fixed, motion={"to": [0.02, 0.0, 0.01], "turn": 4.0, "count": 2}, material=material
+        ),
+        "light": lambda: scene(tmp_path, fixed, light={"turn": 4.0, "count": 2}, material=material),
+    }[kind]()
+    bake(config, tmp_path / "pem")
+    pem = open_pem(tmp_path / "pem")
+    assert len(pem.space) == (4 if kind == "dome" else 2)
+    middle = pem.space.middle_after(0)
+    assert middle is not None
+    for point, least in ((pem.space.sample(0), 20.0), (pem.space.sample(1), 20.0), (middle, 17.0)):
+        trace = pem.stage.trace(point)
+        images = images_of_trace(trace)
+        drawn = pem.run_time.render("pem", point, trace.samples)
+        # Pixels of this size hold silhouettes and glints; a map of a wrong place has 10 to 14 dB.
+        assert psnr(drawn, images.object, images.coverage >= 0.99) > least, (kind, point)
+    render(tmp_path / "pem", middle, tmp_path / "middle.png")
+    assert (tmp_path / "middle.png").is_file()
+
+
+def test_shells_of_the_object_itself_move_with_it(tmp_path: Path) -> None:
+    motion = {"to": [0.1, 0.0, 0.0], "turn": 90.0, "count": 2}
+    config = scene(tmp_path, {"kind": "fixed"}, motion=motion)
+    bake(config, tmp_path / "pem")
+    pem = open_pem(tmp_path / "pem")
+    local, distant = pem.store.header.parts[0].shells
+    assert (local.moves, distant.moves) == (True, False)
+    moved = pem.stage.at((1.0,)).built
+    body = moved.positions[np.unique(moved.triangles[moved.parts == 0])].astype(np.float64)
+    proxy = local.proxy_at(pem.run_time._pose_at((1.0,)))
+    inside = (body - np.array(proxy.centre)) @ np.asarray(proxy.axes, np.float64).T / np.array(proxy.radii)
+    farthest = np.linalg.norm(inside, axis=1).max()
+    assert 0.98 < farthest < 1.001
+    # A quarter turn takes the spout from +X to -Z.
+    rest = pem.stage.built.positions
+    assert np.ptp(moved.positions[:, 2]) == pytest.approx(np.ptp(rest[:, 0]), rel=1e-5)
+
+
+def test_pieces_of_a_bake_are_the_whole_and_workers_bake_the_same_bits(tmp_path: Path) -> None:
+    config = scene(tmp_path, DOME)
+    bake(config, tmp_path / "whole")
+    whole = objects(tmp_path / "whole")
+    assert len(whole) == 8
+    for piece in (range(2, 4), range(1)):
+        summary = bake(config, tmp_path / "pieces", samples=piece)
+    assert summary.resumed == 0
+    assert PemStore.open(tmp_path / "pieces").completed().tolist() == [True, False, True, True]
+    summary = bake(config, tmp_path / "pieces", workers="2")
+    assert summary.resumed == 3
+    assert objects(tmp_path / "pieces") == whole
+    url = f"memory://bake-{tmp_path.name}"
+    bake(config, url)
+    names = PemStore.open(url).header.map_names()
+    for name in names:
+        np.testing.assert_array_equal(
+            PemStore.open(url).read_map(*name, 3), PemStore.open(tmp_path / "whole").read_map(*name, 3)
+        )
+
+
+def test_damaged_samples_are_baked_anew_to_the_same_bits(tmp_path: Path) -> None:
+    config = scene(tmp_path, {"count": 3, "degrees": 20})
+    bake(config, tmp_path / "pem")
+    before = objects(tmp_path / "pem")
+    group = tmp_path / "pem" / "pem.zarr"
+    flipped = group / "maps" / "c" / "1" / "0" / "0" / "0"
+    content = bytearray(flipped.read_bytes())
+    content[len(content) // 2] ^= 4
+    flipped.write_bytes(content)
+    (group / "reference" / "c" / "2" / "0" / "0" / "0").unlink()
+    assert verify(tmp_path / "pem").damaged == (1, 2)
+    with pytest.raises(StoreError, match="sample 2 of reference is missing"):
+        open_pem(tmp_path / "pem").store.read_images(2)
+    summary = bake(config, tmp_path / "pem")
+    assert summary.resumed == 1
+    assert sum("baked anew" in note for note in summary.notes) == 2
+    assert objects(tmp_path / "pem") == before
+    assert verify(tmp_path / "pem").is_sound
+
+
+def test_an_estimate_is_told_before_the_bake_and_may_end_it(tmp_path: Path) -> None:
+    config = scene(tmp_path, {"count": 3, "degrees": 20})
+    told: list[Estimate] = []
+
+    def answer(estimate: Estimate) -> bool:
+        told.append(estimate)
+        return len(told) > 1
+
+    bake(config, tmp_path / "pem", on_estimate=answer)
+    assert not PemStore.exists(tmp_path / "pem")
+    bake(config, tmp_path / "pem", on_estimate=answer)
+    store = PemStore.open(tmp_path / "pem")
+    assert told[0].samples == 3
+    # The trial image is as large as these views are, so that only what compresses differs.
+    actual = np.mean([store.sample_bytes(index) for index in range(3)])
+    assert told[0].bytes == pytest.approx(actual, rel=0.3)
+    assert "for 3 samples" in str(told[0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"samples": [4]}, OptionError, "sample 4: expected 0 to 2"),
+        ({"workers": "0"}, OptionError, "workers = 0: expected 1 to 1024"),
+        ({"workers": "tcp://127.0.0.1:1"}, InputError, "no scheduler answers there"),
+    ],
+)
+def test_a_bake_that_cannot_be_is_refused(
+    arguments: dict[str, Any], error: type[Exception], message: str, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr("mirrorbake.bake.workers.CONNECT_SECONDS", 1)
+    with pytest.raises(error, match=message):
+        bake(scene(tmp_path, {"count": 3}), tmp_path / "pem", **arguments)
+
+
+KILLS = int(os.environ.get("MIRRORBAKE_KILLS", "3"))
+"""A long run tries 40."""
+
+
+@pytest.mark.parametrize("workers", [None, "2"])
+def test_a_bake_that_is_killed_at_any_moment_is_resumed_to_the_same_bits(
+    workers: str | None, tmp_path: Path
+) -> None:
+    config = scene(tmp_path, {"count": 6, "degrees": 50})
+    start = time.monotonic()
+    bake(config, tmp_path / "whole")
+    whole, seconds = objects(tmp_path / "whole"), time.monotonic() - start
+    (tmp_path / "scene.json").write_text(config.model_dump_json())
+    script = f"""
+import json
+from mirrorbake.bake.bake import bake
+from mirrorbake.scene.load import parse_config
+if __name__ == "__main__":
+    config = parse_config(json.load(open({str(tmp_path / "scene.json")!r})), "scene")
+    bake(config, {str(tmp_path / "killed")!r}, workers={workers!r})
+"""
+    (tmp_path / "run.py").write_text(script)
+    random = np.random.default_rng(7)
+    for _ in range(KILLS):
+        process = subprocess.Popen(
+            [sys.executable, str(tmp_path / "run.py")],
+            start_new_session=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        time.sleep(float(random.uniform(0.5, 1.0)) * (2.0 + seconds))
+        # Workers die with the process that started them, or at least with their connection to it.
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    bake(config, tmp_path / "killed")
+    assert objects(tmp_path / "killed") == whole
+    assert verify(tmp_path / "killed").is_sound

@@ -8,7 +8,6 @@
 #include "display_rows.hpp"
 #include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
-#include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/surface/lookup.hpp"
 
 namespace mirrorbake {
@@ -94,7 +93,7 @@ MapSolution fit_layers(std::span<const DisplayView> views, const std::vector<Lay
   for (std::size_t i = 0; 3 * i < prior.size(); ++i) {
     start.insert(start.end(), {prior[3 * i], prior[3 * i + 1], prior[3 * i + 2], 0.0F});
   }
-  // α has no prior: the solve of radiance alone would have one, so that both start from it without being pulled to it.
+  // The prior is where this fit starts; what pulls towards it is the joint fit, since α has none.
   return MapSolver(solver_views, model.maps, nodes, options)
       .solve({.channels = 4, .views = wanted, .initial = start});
 }
@@ -152,7 +151,7 @@ void weigh(const DisplayView& view, const DisplayRows& pixels, const LayerRows& 
   }
 }
 
-// Σ weight · map over the nodes of a view; maps hold `stride` numbers a texel, of which those from `first` are taken.
+// Σ weight · map over the nodes of a view.
 std::vector<float> blend(std::span<const float> maps, const FitModel& model,
                          const std::vector<NodeWeight>& nodes, std::size_t channels) {
   const std::size_t size = model.texels() * channels;
@@ -176,7 +175,6 @@ DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPa
   std::vector<LayerRows> layers;
   for (const DisplayView& view : views) layers.push_back(build_layer_rows(model, view));
   MapSolution start = fit_layers(views, layers, model, nodes, options.solve, prior);
-  // What is behind the last shell of a part is never seen.
   std::vector<float> light(3 * texels), alpha(texels);
   for (std::size_t i = 0; i < texels; ++i) {
     for (std::size_t k = 0; k < 3; ++k) light[3 * i + k] = start.texels[4 * i + k];

@@ -183,3 +183,55 @@ def proxy_command(
         largest = max(error.largest for error in group)
         table.add_row(shape, f"{aspect:g}", arithmetic, _number(largest), _number(mean))
     Console(highlight=False).print(table)
+
+
+@app.command("inference")
+@reports_errors
+def inference_command(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)],
+    azimuth: Annotated[
+        float, typer.Option("--azimuth", help="Of the view that is inferred, degrees.")
+    ] = 22.0,
+    elevation: Annotated[float, typer.Option("--elevation", help="Of that view, degrees.")] = 20.0,
+    size: Annotated[int, typer.Option("--size", min=16, max=1024, help="Pixels a side of the views.")] = 256,
+    map_size: Annotated[
+        int, typer.Option("--map-size", min=8, max=512, help="Texels a side of a face.")
+    ] = 128,
+    samples: Annotated[int, typer.Option("--samples", min=1, max=4096, help="Per pixel, of targets.")] = 256,
+    reference_samples: Annotated[
+        int, typer.Option("--reference-samples", min=1, max=4096, help="Per pixel, of references.")
+    ] = 256,
+    run_times: Annotated[
+        str, typer.Option("--run-times", metavar="A,B,…", help="Which infer and draw.")
+    ] = "Reference,Web,Web1",
+    assignments: Assignments = None,
+    json: Json = False,
+    threads: Threads = 0,
+) -> None:
+    """Decibels of one view's maps, on it and away from it, by run time and by what is fitted."""
+    from dataclasses import asdict
+
+    from mirrorbake.scene.stage import prepare_stage
+    from mirrorbake.study import inference
+
+    config = scene_config(scene, assignments, None, f"{size}x{size}", None, None, None)
+    names = [name.strip() for name in run_times.split(",") if name.strip()]
+    with _core.ThreadLimit(threads):
+        lab = inference.Lab(prepare_stage(config), (azimuth, elevation), samples, reference_samples, map_size)
+        results = inference.study(
+            lab, names, inference.OPTIONS, lambda text: messages.print(text, markup=False)
+        )
+    if json:
+        typer.echo(json_module.dumps([asdict(result) for result in results]))
+        return
+    table = Table("run time", "maps of", *inference.PLACES, "seconds", "converged")
+    for result in results:
+        decibels = (f"{value:.1f}" for value in result.decibels.values())
+        table.add_row(
+            result.run_time,
+            result.fit,
+            *decibels,
+            f"{result.seconds:.1f}",
+            "yes" if result.converged else "no",
+        )
+    Console(highlight=False, width=None if sys.stdout.isatty() else 140).print(table)

@@ -35,7 +35,7 @@ struct DisplayView {
 struct DisplayFitOptions {
   SolveOptions solve;
   /// μ, weight of the layers' own rows beside the pixels', ≥ 0.
-  float layer_weight = 0.1F;
+  float layer_weight = 0.03F;
   /// Below this radiance the derivative of the display's curve is held, in (0, 1].
   float softening = 0.03F;
   /// How often the weights of the rows are taken from the model's own image, 1…16.

@@ -6,7 +6,7 @@ import contextlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from mirrorbake.bake.analyze import analyze
 from mirrorbake.bake.estimate import Estimate, estimate
 from mirrorbake.bake.sample import DIFFUSE_RAYS, SampleBaker
 from mirrorbake.bake.workers import bake_into, bake_on_workers
-from mirrorbake.errors import OptionError, StoreError
+from mirrorbake.errors import InputError, OptionError, StoreError
 from mirrorbake.pem.header import Header, Source
 from mirrorbake.pem.location import GROUP_NAME, Location
+from mirrorbake.pem.run_time import TRACED_SAMPLES
 from mirrorbake.pem.shells import Part, Shell
 from mirrorbake.pem.store import Contents, PemStore, exclusive
 from mirrorbake.pem.verify import damaged_samples
@@ -231,16 +232,29 @@ def _contents(stage: Stage, plan: Plan, source: Source) -> Contents:
         map_size=plan.map_size,
         precision=config.maps.precision,
         image_size=config.views.size,
-        run_time={
-            "name": "reference",
-            "lookups": plan.samples,
-            "footprint_scale": config.infer.footprint_scale,
-        },
+        run_time=_run_time(config, plan),
     )
     local_triangles = None
     if plan.has_hull_split:
         local_triangles = (~hull_triangles(built.positions, built.triangles)).astype(np.uint8)
+    if config.infer.fit == "display" and any(len(part.shells) < 2 for part in header.parts):
+        raise InputError('infer.fit = "display": needs both shells of every part; set layers.local = true')
     return Contents(header, capture, irradiance, local_triangles)
+
+
+def _run_time(config: SceneConfig, plan: Plan) -> dict[str, Any]:
+    if config.infer.fit == "layers":
+        return {
+            "name": TRACED_SAMPLES,
+            "lookups": plan.samples,
+            "footprint_scale": config.infer.footprint_scale,
+        }
+    model = _core.run_time_model(config.infer.run_time)
+    return {
+        "name": config.infer.run_time,
+        "lookups": len(model.places),
+        "footprint_scale": model.footprint_scale,
+    }
 
 
 def _part(built: BuiltScene, plan: Plan, number: int) -> Part:

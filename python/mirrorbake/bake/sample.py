@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.pem.run_time import lookups_of
+from mirrorbake.pem.run_time import lookups_of, model_of
 from mirrorbake.pem.store import SolverReport, Timings
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
 from mirrorbake.scene.pose import Pose
@@ -73,8 +73,14 @@ class SampleBaker:
             )
         capture = self._capture_of(stage)
         seconds = [time.perf_counter() - start, 0.0, 0.0]
-        maps, reports = {}, {}
+        maps: dict[tuple[str, str], FloatArray] = {}
+        reports: dict[tuple[str, str], SolverReport] = {}
         pose = Pose.of(self._stage.config, self._header.space.scene_coordinates(point).get("motion", 0.0))
+        if self._stage.config.infer.fit == "display":
+            start = time.perf_counter()
+            maps, reports = self._fit_display(point, trace.samples, pose, capture)
+            seconds[2] = time.perf_counter() - start
+            return BakedSample(maps, images_of_trace(trace), irradiance, Timings(*seconds), reports)
         for number, part in enumerate(self._header.parts):
             for shell in part.shells:
                 start = time.perf_counter()
@@ -100,6 +106,42 @@ class SampleBaker:
             origin, self._header.map_size, [stage.built.reflector], self._stage.options
         )
         return _core.build_cube_pyramid(captured)
+
+    def _fit_display(
+        self, point: Point, samples: _core.SurfaceSamples, pose: Pose, capture: FloatArray
+    ) -> tuple[dict[tuple[str, str], FloatArray], dict[tuple[str, str], SolverReport]]:
+        header = self._header
+        model = model_of(header.run_time)
+        lookups = self._stage.visibility(point, model.places)
+        targets = _core.ViewTargets(samples.width, samples.height, len(header.parts), len(samples.shells))
+        targets.add(samples)
+        numbers = {entry.name: number for number, entry in enumerate(header.maps)}
+        prior = np.zeros((len(numbers), self._layout.texels, 3), np.float32)
+        parts = []
+        for part in header.parts:
+            shells = []
+            for shell in part.shells:
+                off_hull = self._local_triangles if shell.polygons == "off hull" else None
+                shells.append(_core.FitShell(shell.proxy_at(pose), numbers[shell.map], off_hull))
+                if shell.rule == "rest":
+                    prior[numbers[shell.map]] = capture
+            parts.append(shells)
+        texels, passes = _core.fit_display(
+            [_core.DisplayView(lookups, targets)],
+            parts,
+            [_core.TexelTopology.cube(header.map_size)] * len(numbers),
+            run_time=model,
+            options=_core.DisplayFitOptions(solve=self._solve),
+            prior=prior.reshape(-1, 3) if self._stage.config.infer.prior == "captured" else None,
+        )
+        stacked = np.asarray(texels).reshape(len(numbers), -1, 4)
+        last = passes[-1]
+        report = SolverReport(last.iterations, float(last.relative_gradient), last.converged)
+        maps = {}
+        for name in header.map_names():
+            number = header.map_of(*name)
+            maps[name] = np.ascontiguousarray(stacked[number, :, : header.maps[number].channels])
+        return maps, dict.fromkeys(maps, report)
 
     def _infer(
         self, matrix: _core.RenderingMatrix, target: FloatArray, prior: FloatArray | None

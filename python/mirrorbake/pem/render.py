@@ -55,8 +55,8 @@ def picture_of(pem: OpenedPem, point: PointLike) -> FloatArray:
     """Draw an opened PEM over its ray-traced background; as `render`, which writes the picture too."""
     blend = pem.space.neighbours(point)
     if len(blend) == 1 and pem.space.sample(blend[0][0]) == pem.space.point(point):
-        samples, images = pem.stage.visibility(point), pem.store.read_images(blend[0][0])
+        images = pem.store.read_images(blend[0][0])
     else:
-        trace = pem.stage.trace(point)
-        samples, images = trace.samples, images_of_trace(trace)
+        images = images_of_trace(pem.stage.trace(point))
+    samples = pem.stage.visibility(point, pem.run_time.places)
     return images.composite(pem.run_time.render("pem", point, samples))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -45,6 +45,17 @@ def lookups_of(footprint_scale: float) -> _core.RunTimeModel:
     )
 
 
+def model_of(run_time: Mapping[str, Any]) -> _core.RunTimeModel:
+    """Return the run time that a PEM's attributes name."""
+    if run_time["name"] == TRACED_SAMPLES:
+        return lookups_of(run_time["footprint_scale"])
+    return _core.run_time_model(run_time["name"])
+
+
+TRACED_SAMPLES = "reference"
+"""Name of the run time that reads maps once for every traced sample."""
+
+
 @dataclass
 class RunTime:
     """A PEM opened for drawing.
@@ -61,7 +72,7 @@ class RunTime:
     def __post_init__(self) -> None:
         self._header: Header = self.store.header
         self._layout = _core.CubePyramidLayout(self._header.map_size)
-        self._options = lookups_of(self._header.run_time["footprint_scale"])
+        self._options = model_of(self._header.run_time)
         self._config = parse_config(self._header.source.config, str(self.store.location))
         self._irradiance = self.store.read_irradiance()
         self._local_triangles = self.store.read_local_triangles()
@@ -72,6 +83,11 @@ class RunTime:
     def model(self) -> _core.RunTimeModel:
         """How the maps were read when they were inferred."""
         return self._options
+
+    @property
+    def places(self) -> Sequence[Sequence[float]]:
+        """Where in a pixel the model reads; none for one that reads at the traced samples."""
+        return () if self._header.run_time["name"] == TRACED_SAMPLES else self._options.places
 
     @property
     def has_static_proxy(self) -> bool:

@@ -100,7 +100,7 @@ class StaticAttributes(_Model):
 class RunTimeAttributes(_Model):
     """For which run time the maps were inferred."""
 
-    name: Annotated[str, Field(max_length=100)]
+    name: Literal["reference", "Web", "Web1", "Reference"]
     lookups: Annotated[int, Field(ge=1, le=65536)]
     footprint_scale: Annotated[Number, Field(gt=0, le=64)]
 

@@ -192,6 +192,12 @@ class Trace(Section):
 class Infer(Section):
     """[infer]: how the maps are solved for."""
 
+    fit: Literal["layers", "display"] = "layers"
+    """`layers`: every shell is fitted to the light that it holds. `display`: all shells and parts together to
+    the pixels that `run_time` will show, as a display shows them."""
+    run_time: Literal["Web", "Web1", "Reference"] = "Web"
+    """What draws the maps of fit = "display": 4 lookups a pixel with up to 4 taps, as the page does; one
+    lookup; 16 lookups."""
     smoothness: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
     """Weight λ of differences between neighbouring texels: small fits the sampled view best, large survives
     longer away from it."""

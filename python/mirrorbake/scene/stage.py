@@ -9,7 +9,7 @@ from mirrorbake import _core
 from mirrorbake.scene.build import BuiltScene, build_scene
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from mirrorbake.scene.config import SceneConfig
     from mirrorbake.scene.parameters import ParameterSpace, Point, PointLike
@@ -61,11 +61,11 @@ class Stage:
             self.moved[key] = replace(_prepared(self.config, self.space.point(point)), place=place)
         return replace(self.moved[key], config=self.config)
 
-    def visibility(self, point: PointLike) -> _core.SurfaceSamples:
-        """Where the camera of a point sees the reflector."""
+    def visibility(self, point: PointLike, places: Sequence[Sequence[float]] = ()) -> _core.SurfaceSamples:
+        """Where the camera of a point sees the reflector: at random in every pixel, or at places of it."""
         stage, place = self.at(point), self.space.point(point)
         return stage.tracer.trace_visibility(
-            stage.built.cameras.camera(place), stage.built.reflector, self.options
+            stage.built.cameras.camera(place), stage.built.reflector, self.options, places
         )
 
     def trace(self, point: PointLike) -> _core.LayerTrace:

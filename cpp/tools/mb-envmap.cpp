@@ -6,7 +6,6 @@
 #include <iostream>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -85,6 +84,8 @@ struct Convert {
   std::string filter = "automatic";
   std::string convention = "mirrorbake";
   float turn = 0.0F;
+  std::vector<float> axis = {0.0F, 1.0F, 0.0F};
+  float exposure = 0.0F;
 
   void run(bool json) const {
     const Projection target = parse_projection(projection);
@@ -96,17 +97,30 @@ struct Convert {
         std::max(1, static_cast<int>(std::lround(std::sqrt(texels / natural_aspect(target)))));
     const Size wanted =
         size.empty() ? Size{natural * natural_aspect(target), natural} : parse_size(size, target);
-    const float angle = turn * std::numbers::pi_v<float> / 180.0F;
-    const float c = std::cos(angle);
-    const float s = std::sin(angle);
     ResampleOptions options{parse_resample_filter(filter)};
-    options.source_from_target = glm::mat3(glm::vec3(c, 0, -s), glm::vec3(0, 1, 0), glm::vec3(s, 0, c));
+    options.source_from_target = rotation();
     const bool same = target == source.layout.projection && wanted.width == source.layout.width &&
                       wanted.height == source.layout.height && turn == 0.0F;
     EnvMap result = same ? source : resample(source, target, wanted.width, wanted.height, options);
     if (convention != "mirrorbake")
       result = convert_convention(result, convention, ConventionWay::to_foreign);
+    if (exposure != 0.0F) {
+      for (float& value : result.values) value *= std::exp2(exposure);
+    }
     output.save(result, json);
+  }
+
+  // Of directions in the result to those in the input, by Rodrigues' formula: the surroundings turn clockwise for
+  // somebody whom the axis points at, about +Y from −Z towards +X.
+  glm::mat3 rotation() const {
+    const glm::vec3 given(axis[0], axis[1], axis[2]);
+    if (!std::isfinite(glm::length(given)) || !(glm::length(given) > 0.0F)) {
+      throw InvalidArgument("--axis", json_list(axis), "three finite numbers that are not all 0");
+    }
+    const glm::dvec3 a = glm::normalize(glm::dvec3(given));
+    const double angle = glm::radians(static_cast<double>(turn));
+    const glm::dmat3 cross(glm::dvec3(0, a.z, -a.y), glm::dvec3(-a.z, 0, a.x), glm::dvec3(a.y, -a.x, 0));
+    return glm::mat3(glm::dmat3(1.0) + std::sin(angle) * cross + (1.0 - std::cos(angle)) * cross * cross);
   }
 };
 
@@ -264,7 +278,13 @@ int run(int argc, char** argv) {
       ->add_option("--to-convention", convert.convention, "orientation to make, as for --from-convention")
       ->capture_default_str();
   convert_command
-      ->add_option("--turn", convert.turn, "degrees to turn the surroundings about +Y, from -Z towards +X")
+      ->add_option("--turn", convert.turn,
+                   "degrees to turn the surroundings about the axis: about +Y from -Z towards +X")
+      ->capture_default_str();
+  convert_command->add_option("--axis", convert.axis, "x y z of the axis of --turn")
+      ->expected(3)
+      ->capture_default_str();
+  convert_command->add_option("--exposure", convert.exposure, "stops by which radiance is raised")
       ->capture_default_str();
 
   Input mips_input;

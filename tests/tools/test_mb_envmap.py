@@ -111,6 +111,19 @@ def test_turning_moves_what_lay_ahead_to_the_right(tmp_path: Path) -> None:
     assert turned.sample([0.0, 0.0, -1.0])[0] < 0.1
 
 
+def test_turning_about_another_axis_and_exposure(tmp_path: Path) -> None:
+    image = np.zeros((64, 128, 1), np.float32)
+    image[28:36, 60:68] = 1  # ahead, −Z
+    EnvMap.from_array(image, "latlong").save(tmp_path / "in.exr")
+    arguments = ("--to", "latlong", "--size", 64, "--turn", 90, "--axis", 2, 0, 0, "--exposure", 3)
+    mb_envmap("convert", tmp_path / "in.exr", *arguments, "-o", tmp_path / "out.exr")
+    turned = EnvMap.load(tmp_path / "out.exr")
+    assert turned.sample([0.0, -1.0, 0.0])[0] == pytest.approx(8, rel=0.05)
+    assert turned.sample([0.0, 0.0, -1.0])[0] < 0.1
+    nowhere = (*arguments[:6], "--axis", 0, 0, 0, "-o", tmp_path / "no.exr")
+    assert "--axis is [0, 0, 0]" in mb_envmap("convert", tmp_path / "in.exr", *nowhere, status=2)
+
+
 def test_mips_border_and_sample(panorama: Path, tmp_path: Path) -> None:
     mb_envmap("convert", panorama, "--to", "cube", "--size", 16, "-o", tmp_path / "cube.exr")
     mb_envmap("mips", tmp_path / "cube.exr", "-o", tmp_path / "cube.ktx2")

@@ -1,8 +1,8 @@
 """View-dependent radiance maps of any isotropic BRDF, warped and blended: [RSI].
 
 A radiance map is a sphere map of what a ball of some material shows to a viewer far away. Maps for the
-corners of an icosahedron are made ahead; the map of any other view is those of the three corners around it, each
-warped so that its features lie where they belong, and blended by spherical barycentric weights.
+corners of an icosahedron are made ahead; the map of any other view is those of the three corners around it,
+each warped so that its features lie where they belong, and blended by spherical barycentric weights.
 """
 
 from __future__ import annotations

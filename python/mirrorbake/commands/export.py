@@ -137,7 +137,7 @@ def _export_maps(
     sample: int | None,
     all_samples: bool,
 ) -> None:
-    from mirrorbake.pem.export.map_sets import axis_descriptions, sample_set, static_set
+    from mirrorbake.pem.export.map_sets import axis_descriptions, footprint_scale, sample_set, static_set
     from mirrorbake.pem.export.maps import DESCRIPTION_NAME, export_maps
     from mirrorbake.pem.store import PemStore
 
@@ -156,6 +156,7 @@ def _export_maps(
         sets(),
         out,
         axes=axis_descriptions(store.header.space),
+        footprint=footprint_scale(store),
         format=format,
         convention=convention,
         precision=precision,

@@ -10,7 +10,7 @@ from mirrorbake import _core
 from mirrorbake.files import atomic_output, check_writable
 from mirrorbake.pem.export.glb_file import GlbFile
 from mirrorbake.pem.export.gltf_material import fresnel_description, gltf_material
-from mirrorbake.pem.export.map_sets import axis_descriptions, sample_set, static_set
+from mirrorbake.pem.export.map_sets import axis_descriptions, footprint_scale, sample_set, static_set
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def export_glb(
     code = _code_for(sets())
     extension = {
         "version": EXTENSION_VERSION,
-        "footprintScale": store.header.source.config["infer"]["footprint_scale"],
+        "footprintScale": footprint_scale(store),
         "axes": axis_descriptions(store.header.space),
         "radianceCode": {"low": code.low, "high": code.high, "epsilon": code.epsilon},
         "sets": [_add_set(file, maps, code) for maps in sets()],

@@ -65,6 +65,11 @@ def axis_descriptions(space: ParameterSpace) -> list[dict[str, Any]]:
     ]
 
 
+def footprint_scale(store: PemStore) -> float:
+    """Size of a lookup's footprint in pixels for which the maps were inferred."""
+    return float(store.header.run_time["footprint_scale"])
+
+
 def static_set(store: PemStore) -> MapSet:
     """The set that needs no parameter: the captured surroundings, on the outermost shell's geometry."""
     header = store.header

@@ -34,6 +34,7 @@ def export_maps(
     convention: str = "threejs",
     precision: str = "half",
     axes: Sequence[Mapping[str, Any]] = (),
+    footprint: float = 1.0,
     report: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """Write sets of maps and a `maps.json` that says what they are.
@@ -55,6 +56,8 @@ def export_maps(
         Of the files. `float32` keeps the values of all levels exactly; `half` rounds them.
     axes
         Of the parameter space, for the description.
+    footprint
+        Size of a lookup's footprint in pixels for which the maps were inferred, for the description.
     report
         Called with a sentence for each thing to know, such as values that were clamped.
 
@@ -83,6 +86,7 @@ def export_maps(
         "lookup_from_space": (frame.lookup_matrix @ frame.space_matrix.T).tolist(),
         "radiance": "scene-linear, Rec.709 primaries; four channels: premultiplied by the fourth, alpha",
         "shells": "front to back: L = L0 + (1 - a0) (L1 + (1 - a1) (...))",
+        "footprintScale": footprint,
         "axes": list(axes),
         "sets": [],
     }

@@ -55,8 +55,8 @@ def test_auto_is_a_value_of_every_key_that_is_decided_before_a_bake() -> None:
         ({"maps": {"size": 0}}, "scene: maps.size = 0: should be greater than or equal to 1"),
         ({"maps": {"size": 8192}}, "scene: maps.size = 8192: should be less than or equal to 4096"),
         ({"maps": {"size": 64.0}}, "scene: maps.size = 64.0: should be a valid integer"),
-        ({"maps": {"sise": 64}}, "scene: maps.sise: is not a key of this section"),
-        ({"map": {}}, "scene: map: is not a key of this section"),
+        ({"maps": {"sise": 64}}, "scene: maps.sise: is not a key of this section; did you mean `size`?"),
+        ({"map": {}}, "scene: map: is not a key of this section; did you mean `maps`?"),
         ({"maps": 3}, "scene: maps: should be a section"),
         ({"views": {"count": 0}}, "scene: views.count = 0: should be greater than or equal to 1"),
         ({"views": {"size": [512, 0]}}, "scene: views.size.1 = 0: should be greater than or equal to 1"),
@@ -75,18 +75,16 @@ def test_auto_is_a_value_of_every_key_that_is_decided_before_a_bake() -> None:
         ({"trace": {"samples": 0}}, "scene: trace.samples = 0: should be greater than or equal to 1"),
         ({"trace": {"samples": True}}, "scene: trace.samples = True: should be a valid integer"),
         ({"reflector": {"object": "cow"}}, "scene: reflector.object = 'cow': should be 'teapot'"),
-        ({"reflector": {}}, "scene: reflector: give either `object`, `mesh` or `scene_object`"),
         (
             {"reflector": {"object": "teapot", "mesh": "a.obj"}},
             "scene: reflector: give either `object`, `mesh` or `scene_object`",
         ),
-        ({"surroundings": {}}, "scene: surroundings: give either `room`, `panorama` or `scene`"),
         (
             {"material": {"r0": 1.5}},
             "scene: material.r0.0 = 1.5: should be less than or equal to 1 (and 2 more)",
         ),
         (
-            {"material": {"ior": 1.5}},
+            {"material": {"fresnel": "schlick", "ior": 1.5}},
             "scene: material: `ior` has no meaning for fresnel = 'schlick'",
         ),
         (
@@ -229,3 +227,17 @@ def test_every_key_of_the_scene_file_is_in_its_reference_page(request: pytest.Fi
             assert f"`{key}`" in text, f"{section}.{key} is not documented"
     for section, key in PATH_KEYS:
         assert key in type(getattr(config, section)).model_fields
+
+
+def test_every_key_alone_has_defaults_beside_it() -> None:
+    assert parse_config({"reflector": {"height": 0.2}}, "scene").reflector.object == "teapot"
+    assert parse_config({"surroundings": {"rotation": 30.0}}, "scene").surroundings.room == "furnished"
+    gold = parse_config({"material": {"metal": "gold"}}, "scene").material
+    assert gold is not None
+    assert gold.fresnel == "conductor"
+    glass = parse_config({"material": {"ior": 1.7}}, "scene").material
+    assert glass is not None
+    assert glass.fresnel == "dielectric"
+    chrome = parse_config({"material": {"metal": "Chrome"}}, "scene").material
+    assert chrome is not None
+    assert chrome.metal == "chromium"

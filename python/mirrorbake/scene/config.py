@@ -20,6 +20,7 @@ from mirrorbake.scene.config_values import (
     Reflectance,
     Section,
     Vec3,
+    with_default,
 )
 from mirrorbake.scene.config_views import Light, Motion, Views
 
@@ -51,6 +52,11 @@ class Reflector(Section):
     parts: Literal["split", "joined"] = "split"
     """Whether each part (the teapot's lid and body) gets maps of its own."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _teapot_by_default(cls, data: Any) -> Any:
+        return with_default(data, ("object", "mesh", "scene_object"), "teapot")
+
     @model_validator(mode="after")
     def _one_source(self) -> Reflector:
         if sum(source is not None for source in (self.object, self.mesh, self.scene_object)) != 1:
@@ -64,10 +70,15 @@ class Reflector(Section):
         return self
 
 
+_OTHER_NAMES = {"chrome": "chromium"}
+"""How people call metals that the tables know by another name."""
+
+
 class MaterialConfig(Section):
     """[material]: what the reflector is made of."""
 
     fresnel: Literal["constant", "schlick", "dielectric", "conductor"] = "schlick"
+    """Default where `metal`, `eta` or `k` is given: `conductor`; where `ior` is: `dielectric`."""
     r0: Reflectance | None = None
     """`constant`: reflectance; `schlick`: at normal incidence. Default 0.9."""
     ior: Index | None = None
@@ -84,6 +95,16 @@ class MaterialConfig(Section):
     """Image that multiplies the albedo, on the mesh's texture coordinates."""
     layers: Literal["additive", "coated"] = "additive"
     """`additive`: F·L + D; `coated`: F·L + (1 - F)·D."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _parameters_imply_the_model(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or "fresnel" in data:
+            return data
+        for keys, model in ((("metal", "eta", "k"), "conductor"), (("ior",), "dielectric")):
+            if any(data.get(key) is not None for key in keys):
+                return {**data, "fresnel": model}
+        return data
 
     @model_validator(mode="after")
     def _parameters_fit_the_model(self) -> MaterialConfig:
@@ -105,6 +126,7 @@ class MaterialConfig(Section):
     @classmethod
     def _known_metal(cls, name: str | None) -> str | None:
         if name is not None:
+            name = _OTHER_NAMES.get(name.lower(), name)
             _core.fit_metal(name, ILLUMINANT)
         return name
 
@@ -131,6 +153,11 @@ class Surroundings(Section):
     scale: Annotated[float, Field(gt=0, le=1e6)] = 1.0
     """Factor on the panorama's radiance."""
     ground: Ground | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _room_by_default(cls, data: Any) -> Any:
+        return with_default(data, ("room", "panorama", "scene"), "furnished")
 
     @model_validator(mode="after")
     def _one_source(self) -> Surroundings:
@@ -274,3 +301,19 @@ PATH_KEYS = (
     ("surroundings", "scene"),
 )
 """The keys whose values are files."""
+
+SECTIONS: Mapping[str, type[Section]] = {
+    "reflector": Reflector,
+    "material": MaterialConfig,
+    "surroundings": Surroundings,
+    "ground": Ground,
+    "views": Views,
+    "motion": Motion,
+    "light": Light,
+    "layers": Layers,
+    "maps": Maps,
+    "trace": Trace,
+    "infer": Infer,
+    "auto": Auto,
+}
+"""Every section by its name."""

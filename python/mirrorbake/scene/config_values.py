@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
@@ -72,6 +73,13 @@ Extinction: TypeAlias = Annotated[
 
 ImageSide: TypeAlias = Annotated[int, Field(ge=1, le=MAX_IMAGE_SIDE)]
 MapSize: TypeAlias = Annotated[int, Field(ge=1, le=MAX_MAP_SIZE), AfterValidator(_power_of_two)]
+
+
+def with_default(data: Any, keys: tuple[str, ...], value: str) -> Any:
+    """Return a section with a value for the first of several keys, where none of them is given."""
+    if isinstance(data, Mapping) and all(data.get(key) is None for key in keys):
+        return {**data, keys[0]: value}
+    return data
 
 
 class Section(BaseModel):

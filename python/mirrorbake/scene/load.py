@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ from pydantic import ValidationError
 
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.files import read_text
-from mirrorbake.scene.config import PATH_KEYS, SceneConfig
+from mirrorbake.scene.config import PATH_KEYS, SECTIONS, SceneConfig
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -28,12 +29,24 @@ def _describe(error: ErrorDetails) -> str:
     # Steps such as 'function-before[...]' are pydantic's own, not keys of the file.
     key = ".".join(str(step) for step in error["loc"] if "[" not in str(step))
     kind = error["type"]
+    if kind == "extra_forbidden":
+        return f"{key}: {_EXPECTATIONS[kind]}{_suggestion([str(step) for step in error['loc']])}"
     if kind in _EXPECTATIONS:
         return f"{key}: {_EXPECTATIONS[kind]}"
     message = error["msg"].removeprefix("Value error, ").replace("Input should", "should")
     if isinstance(error["input"], Mapping):
         return f"{key}: {message}"
     return f"{key} = {error['input']!r}: {message}"
+
+
+def _suggestion(keys: Sequence[str]) -> str:
+    """Return words for the key that was probably meant; none if none is like it."""
+    known: list[str] = list(SceneConfig.model_fields)
+    for key in keys[:-1]:
+        section = SECTIONS.get(key)
+        known = [] if section is None else list(section.model_fields)
+    close = difflib.get_close_matches(keys[-1], known, n=1)
+    return f"; did you mean `{close[0]}`?" if close else ""
 
 
 def _describe_all(errors: Sequence[ErrorDetails]) -> str:

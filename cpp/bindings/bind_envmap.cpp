@@ -240,6 +240,26 @@ void bind_envmap(nb::module_& m) {
               "tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]"),
       "Layout, values and names of the channels of a map in an image or KTX2 file.");
   m.def(
+      "load_panorama",
+      [](const std::string& path, const std::string& layer, const std::string& part) {
+        Image image;
+        {
+          nb::gil_scoped_release released;
+          image = load_panorama(path, {part, layer});
+        }
+        const auto height = static_cast<std::size_t>(image.height);
+        const auto width = static_cast<std::size_t>(image.width);
+        return to_numpy(std::move(image.pixels), {height, width, 3});
+      },
+      nb::arg("path"), nb::arg("layer") = "", nb::arg("part") = "",
+      nb::sig("def load_panorama(path: str, layer: str = '', part: str = '') -> NDArray[numpy.float32]"),
+      "A map as light: a latlong of R, G and B, (height, width, 3). Cubes are recognised by their shape and "
+      "resampled;\n"
+      "alpha, depth and other channels are left out. `layer` and `part` choose in an EXR file. Raises "
+      "FileError "
+      "for\n"
+      "a picture that is no panorama.");
+  m.def(
       "save_envmap",
       [](const std::string& path, const EnvMapLayout& layout, FloatArray values,
          const std::vector<std::string>& channels, const std::string& faces, const std::string& format) {

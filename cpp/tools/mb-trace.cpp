@@ -122,22 +122,9 @@ EnvironmentLight white_sky() {
   return sky;
 }
 
-// Grey as R, G, B; without alpha. Panoramas that were scaled down with a sharpening filter undershoot beside their
-// lights.
-Image load_panorama(const std::string& path) {
-  const Image image = load_image(path);
-  const bool is_grey = image.channel_count() == 1;
-  const std::vector<std::string> rgb = {"R", "G", "B"};
-  if (!is_grey &&
-      (image.channel_count() < 3 || !std::equal(rgb.begin(), rgb.end(), image.channels.begin()))) {
-    throw FileError(path, "does not start with the channels R, G, B");
-  }
-  Image panorama(image.width, image.height, rgb);
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) {
-      for (int c = 0; c < 3; ++c) panorama.at(x, y)[c] = image.at(x, y)[is_grey ? 0 : c];
-    }
-  }
+// Panoramas that were scaled down with a sharpening filter undershoot beside their lights.
+Image load_sky(const std::string& path, const ImageChoice& choice) {
+  Image panorama = load_panorama(path, choice);
   std::size_t negative = 0;
   for (float& value : panorama.pixels) {
     if (!std::isfinite(value)) throw FileError(path, "has values that are not finite, expected radiance");
@@ -157,6 +144,7 @@ struct Request {
   std::string output;
   std::string indirect = "path";
   std::string sky;
+  ImageChoice sky_choice;
   std::string camera_name;
   std::vector<float> eye, target;
   std::optional<float> fov;
@@ -181,8 +169,13 @@ struct Request {
                    "diffuse light by way of other surfaces: path (unbiased), cached (smooth) or none")
         ->capture_default_str()
         ->check(CLI::IsMember({"path", "cached", "none"}));
-    app.add_option("--sky", sky,
-                   "panorama that lights the scene, latitude-longitude, instead of the scene's own");
+    app.add_option(
+        "--sky", sky,
+        "panorama that lights the scene, latitude-longitude or a cube's strip, cross or KTX2, instead of "
+        "the scene's own");
+    app.add_option("--layer", sky_choice.layer, "layer of an EXR sky (default: its only colours)");
+    app.add_option("--part", sky_choice.part,
+                   "part of an EXR sky, by name or number (default: the first with colours)");
     app.add_option("--camera", camera_name, "a camera of the scene, by name (default: its first)");
     app.add_option("--eye", eye, "x y z of the eye, metres")->type_size(3)->expected(1);
     app.add_option("--target", target, "x y z of the point in the image's middle, metres")
@@ -262,7 +255,7 @@ Source Request::load() const {
   Source source = load_source();
   if (!sky.empty()) {
     source.scene.environment.emplace();
-    source.scene.environment->panorama = load_panorama(sky);
+    source.scene.environment->panorama = load_sky(sky, sky_choice);
   } else if (is_dark(source.scene)) {
     std::cerr << "mb-trace: warning: " << path << ": no lights; a white sky of radiance 1 is added\n";
     source.scene.environment = white_sky();

@@ -1388,6 +1388,13 @@ def load_envmap(path: str, projection: str | None = None, faces: str = 'automati
     Layout, values and names of the channels of a map in an image or KTX2 file.
     """
 
+def load_panorama(path: str, layer: str = '', part: str = '') -> NDArray[numpy.float32]:
+    """
+    A map as light: a latlong of R, G and B, (height, width, 3). Cubes are recognised by their shape and resampled;
+    alpha, depth and other channels are left out. `layer` and `part` choose in an EXR file. Raises FileError for
+    a picture that is no panorama.
+    """
+
 def save_envmap(path: str, layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], channels: Sequence[str], faces: str = 'automatic', format: str = 'automatic') -> SaveReport:
     """Write the finest level as an image, or all levels as KTX2."""
 

@@ -6,6 +6,7 @@
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/ktx2.hpp"
+#include "mirrorbake/envmap/resample.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -90,6 +91,30 @@ std::string face_path(const std::string& path, const Projection& projection, int
 }
 
 bool names_faces(const std::string& path) { return path.find("{}") != std::string::npos; }
+
+// A cube that nothing else looks like. Photographs are 3:2 and 4:3, as grids and crosses are: of a cross the cells that
+// hold no face are all of one colour.
+std::optional<FaceLayout> recognised_cube(const Image& image) {
+  if (image.width == 6 * image.height) return FaceLayout::strip;
+  if (image.height == 6 * image.width) return FaceLayout::column;
+  for (const FaceLayout layout : {FaceLayout::cross, FaceLayout::vertical_cross}) {
+    const Arrangement a = *arrangement(layout, 6);
+    if (image.width % a.columns != 0 || image.width * a.rows != image.height * a.columns) continue;
+    const int side = image.width / a.columns;
+    const float* corner = image.at(0, 0);
+    bool is_empty = true;
+    for (int y = 0; y < image.height && is_empty; ++y) {
+      for (int x = 0; x < image.width && is_empty; ++x) {
+        const bool is_face = std::any_of(a.cells.begin(), a.cells.end(), [&](const Cell& c) {
+          return c.column == x / side && c.row == y / side;
+        });
+        is_empty = is_face || std::equal(corner, corner + image.channels.size(), image.at(x, y));
+      }
+    }
+    if (is_empty) return layout;
+  }
+  return std::nullopt;
+}
 
 EnvMap load_faces(const std::string& path, const Projection& projection, const ImageLimits& limits) {
   if (face_count(projection) == 1)
@@ -207,6 +232,35 @@ EnvMap load_envmap(const std::string& path, const std::optional<Projection>& pro
   } catch (const InvalidArgument& e) {
     throw FileError(path, e.what());
   }
+}
+
+Image load_panorama(const std::string& path, const ImageChoice& choice, const ImageLimits& limits) {
+  EnvMap map;
+  if (is_ktx2(path)) {
+    map = load_ktx2(path, limits);
+  } else {
+    const Image image = colours_of(path, load_image(path, limits, choice));
+    const std::optional<FaceLayout> cube = recognised_cube(image);
+    if (image.width != 2 * image.height && !cube) {
+      throw FileError(
+          path, "has " + std::to_string(image.width) + " x " + std::to_string(image.height) +
+                    " pixels, expected a panorama twice as wide as high, a cube's strip of 6:1 or 1:6, or a "
+                    "cross with empty corners; mb-envmap convert --from makes one of other maps");
+    }
+    const Projection projection{cube ? ProjectionKind::cube : ProjectionKind::latlong};
+    map = unpack_faces(image, projection, cube.value_or(FaceLayout::automatic));
+  }
+  if (map.layout.channels == 2) throw FileError(path, "has two channels, expected grey or R, G, B");
+  if (map.layout.projection.kind == ProjectionKind::cube) {
+    EnvMapView finest(map);
+    map = resample(finest, Projection{ProjectionKind::latlong}, 4 * map.layout.width, 2 * map.layout.width);
+  }
+  const auto channels = static_cast<std::size_t>(map.layout.channels);
+  Image panorama(map.layout.width, map.layout.height, {"R", "G", "B"});
+  for (std::size_t i = 0; i < panorama.pixels.size(); ++i) {
+    panorama.pixels[i] = map.values[i / 3 * channels + (channels == 1 ? 0 : i % 3)];
+  }
+  return panorama;
 }
 
 void check_envmap_path(const std::string& path, const Projection& projection, FaceLayout layout,

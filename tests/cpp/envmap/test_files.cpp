@@ -380,5 +380,53 @@ TEST(Compare, MeasuresKnownDifferences) {
   EXPECT_THROW(compare(a, directions("latlong", 4, 4)), InvalidArgument);
 }
 
+// 64 texels a side show a direction to a quarter of a texel's 1.4 degrees where it is interpolated.
+TEST_F(EnvMapFiles, APanoramaIsRecognisedByItsShapeWhateverCubeItIs) {
+  const EnvMap cube = directions("cube", 64, 64);
+  const EnvMap expected = directions("latlong", 256, 128);
+  for (const auto& [name, layout] :
+       {std::pair("strip.exr", FaceLayout::strip), std::pair("column.exr", FaceLayout::column),
+        std::pair("cross.exr", FaceLayout::cross), std::pair("vertical.exr", FaceLayout::vertical_cross),
+        std::pair("cube.ktx2", FaceLayout::automatic)}) {
+    save_envmap(path(name), cube, layout, PixelFormat::float32);
+    const Image panorama = load_panorama(path(name));
+    ASSERT_EQ(panorama.width, 256) << name;
+    for (std::size_t i = 0; i < panorama.pixels.size(); ++i) {
+      ASSERT_NEAR(panorama.pixels[i], expected.values[i], 0.01F) << name << ' ' << i;
+    }
+  }
+  save_envmap(path("sky.exr"), expected, FaceLayout::automatic, PixelFormat::float32);
+  EXPECT_EQ(load_panorama(path("sky.exr")).pixels, expected.values);
+}
+
+TEST_F(EnvMapFiles, APictureThatIsNoPanoramaIsNoLight) {
+  for (const auto& [width, height] :
+       {std::pair(32, 32), std::pair(48, 32), std::pair(64, 48), std::pair(48, 64)}) {
+    Image picture(width, height, {"R", "G", "B"});
+    for (std::size_t i = 0; i < picture.pixels.size(); ++i) picture.pixels[i] = static_cast<float>(i % 7);
+    save_image(path("picture.exr"), picture);
+    try {
+      load_panorama(path("picture.exr"));
+      ADD_FAILURE() << width << " x " << height;
+    } catch (const FileError& e) {
+      EXPECT_NE(std::string(e.what()).find("expected a panorama"), std::string::npos);
+    }
+  }
+}
+
+TEST_F(EnvMapFiles, DepthAndAlphaAreNoLightAndGreyIsAllColours) {
+  Image image(2, 1, {"R", "G", "B", "A", "Z"});
+  image.pixels = {1, 2, 3, 0, 9, 4, 5, 6, 0, 9};
+  save_image(path("deep.exr"), image);
+  EXPECT_EQ(load_panorama(path("deep.exr")).pixels, (std::vector<float>{1, 2, 3, 4, 5, 6}));
+  Image grey(2, 1, {"Y"});
+  grey.pixels = {1, 2};
+  save_image(path("grey.exr"), grey);
+  EXPECT_EQ(load_panorama(path("grey.exr")).pixels, (std::vector<float>{1, 1, 1, 2, 2, 2}));
+  Image depth(2, 1, {"Z"});
+  save_image(path("z.exr"), depth);
+  EXPECT_THROW(load_panorama(path("z.exr")), FileError);
+}
+
 }  // namespace
 }  // namespace mirrorbake

@@ -170,5 +170,5 @@ def test_a_panorama_of_one_channel_is_grey_and_of_others_is_rejected(tmp_path: P
     _core.save_image(str(odd), np.full((4, 8, 3), 0.5, np.float32), ["X", "Y", "Z"])
     built = build(surroundings={"panorama": str(grey), "ground": {"radius": 0.3}})
     assert built.scene.object_names == ["ground", "reflector"]
-    with pytest.raises(InputError, match=r"odd\.exr: channels X, Y, Z; expected R, G, B"):
+    with pytest.raises(_core.FileError, match=r"odd\.exr: has the channels X, Y, Z, expected colours"):
         build(surroundings={"panorama": str(odd)})

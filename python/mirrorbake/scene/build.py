@@ -247,9 +247,7 @@ def _surroundings(surroundings: Surroundings) -> tuple[_core.Scene, list[str]]:
 
 def _add_panorama(scene: _core.Scene, surroundings: Surroundings) -> list[str]:
     assert surroundings.panorama is not None
-    panorama = _core.load_panorama(
-        surroundings.panorama, surroundings.layer or "", surroundings.part or ""
-    )
+    panorama = _core.load_panorama(surroundings.panorama, surroundings.layer or "", surroundings.part or "")
     bad = int(np.count_nonzero(~np.isfinite(panorama)))
     if bad:
         raise InputError(f"{surroundings.panorama}: {bad} values are not finite; expected radiance")

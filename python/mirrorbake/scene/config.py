@@ -144,12 +144,12 @@ class Surroundings(Section):
     room: Literal["furnished"] | None = None
     """A built-in room; or give `panorama` or `scene`."""
     panorama: str | None = None
-    """A latitude-longitude image, its centre along -Z, +Y up, or a cube map that its shape tells; or give `room`
-    or `scene`. With `scene` it is the light from around that."""
+    """A latitude-longitude image, its centre along -Z, +Y up, or a cube map that its shape tells; or give
+    `room` or `scene`. With `scene` it is the light from around that."""
     layer: str | None = None
     """Of a panorama in an EXR file that has colours in several layers."""
     part: str | None = None
-    """Of a panorama in an EXR file of several parts: name or number from 0. The first with colours otherwise."""
+    """Of a panorama in an EXR file of several parts: name or number. Otherwise the first with colours."""
     scene: str | None = None
     """An .obj, .gltf or .glb file with objects, materials and lights; or give `room` or `panorama`."""
     rotation: float = 0.0

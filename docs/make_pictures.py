@@ -12,7 +12,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from mirrorbake import save_image
 from mirrorbake.envmap import EnvMap
+from mirrorbake.prefilter import Prefilter, lambert, phong
+from mirrorbake.prefilter.styles import STYLES, style
 from mirrorbake.projection import texel_directions, texel_solid_angles
 
 if TYPE_CHECKING:
@@ -90,6 +93,36 @@ def density_table() -> None:
     (FOLDER / "densities.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def prefilter_pictures() -> None:
+    """[WP] figure 8, spheres from diffuse to mirror; [EMT] figure 15, the four styles on a sphere."""
+    d = texel_directions("latlong", 512, 256)
+    sky = np.where(d[..., 1:2] > 0, [0.35, 0.55, 0.9], [0.25, 0.2, 0.15]) * (0.6 + 0.4 * np.abs(d[..., 1:2]))
+    windows = (np.sin(9 * np.arctan2(d[..., 0], -d[..., 2])) > 0.3) & (np.abs(d[..., 1] - 0.25) < 0.18)
+    sky = np.where(windows[..., None], [3.0, 2.6, 2.0], sky)
+    sky[d @ np.array([0.36, 0.8, 0.48], np.float32) > 0.995] = 60
+    source = EnvMap.from_array(sky.astype(np.float32), "latlong")
+
+    size = 160
+    place = (np.arange(size) + 0.5) / size * 2.1 - 1.05
+    x, y = np.meshgrid(place, -place)
+    inside = np.hypot(x, y) < 1
+    normal = np.stack([x, y, np.sqrt(np.maximum(0, 1 - x**2 - y**2))], axis=-1).astype(np.float32)[inside]
+    reflected = 2 * normal[:, 2:] * normal - np.array([0, 0, 1], np.float32)
+    filtered = Prefilter(source)
+    diffuse = filtered.sample(lambert(), normal)
+
+    def row(name: str, colors: list[NDArray[np.float32]]) -> None:
+        picture = np.ones((size, size * len(colors), 3), np.float32)
+        for i, color in enumerate(colors):
+            picture[:, i * size : (i + 1) * size][inside] = color / (1 + 0.35 * color)
+        save_image(str(FOLDER / name), picture)
+
+    mirror = source.sample(reflected)
+    row("diffuse_to_mirror.png", [(1 - s) * diffuse + s * mirror for s in (0.0, 0.25, 0.5, 0.75, 1.0)])
+    row("phong_spheres.png", [filtered.sample(phong(n), reflected) for n in (1, 10, 50, 250, 2000)])
+    row("style_spheres.png", [style(name, 256).sample(reflected) for name in STYLES])
+
+
 def draw() -> None:
     """Write all pictures."""
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -106,6 +139,7 @@ def draw() -> None:
         panorama.resample("cube", 96).to_convention(name).save(FOLDER / f"cube_{name}.png")
     panorama.resample("cube", 96).save(FOLDER / "cube_ktx2.png")
     seam_pictures()
+    prefilter_pictures()
 
 
 def on_pre_build(config: Any) -> None:

@@ -11,6 +11,7 @@ from mirrorbake.bake.bake import bake
 from mirrorbake.evaluate.evaluate import evaluate
 from mirrorbake.scene.config import SceneConfig
 from mirrorbake.scene.load import load_config, parse_override
+from mirrorbake.scene.parameters import space_of
 from mirrorbake.scene.stage import prepare_stage
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -56,3 +57,17 @@ def test_the_mesh_example_takes_any_mesh_and_panorama(tmp_path: Path, mesh: str,
     assert static is not None
     # At full size the lead is 5 dB (Suzanne) and 8 dB (Spot); few pixels and noise take some of it.
     assert pem - static > 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "axes"),
+    [
+        ("dome", {"azimuth": 10, "elevation": 5}),
+        ("moving-object", {"motion": 11}),
+        ("turning-light", {"light": 11}),
+    ],
+)
+def test_the_examples_of_other_spaces_span_them(name: str, axes: dict[str, int]) -> None:
+    # What is over such spaces is baked, smaller, in test_bake_spaces.
+    space = space_of(load_config(EXAMPLES / f"{name}.toml"))
+    assert {axis.name: len(axis.values) for axis in space.axes} == axes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -22,10 +23,28 @@ if TYPE_CHECKING:
 
 messages = Console(stderr=True, highlight=False)
 
+SECONDS_BETWEEN_LINES = 10.0
+"""Where no terminal shows bars, as in a log. What takes less prints none."""
+
+
+def _lines(title: str) -> ProgressReport:
+    last = time.monotonic()
+
+    def report(done: int, total: int, text: str) -> None:
+        nonlocal last
+        if time.monotonic() - last >= SECONDS_BETWEEN_LINES:
+            last = time.monotonic()
+            messages.print(f"{title}: {done} of {total}, {text}", markup=False, soft_wrap=True)
+
+    return report
+
 
 @contextlib.contextmanager
 def progress() -> Iterator[Callable[[str], ProgressReport]]:
-    """Show progress bars on stderr; what is yielded adds one."""
+    """Show progress on stderr: bars on a terminal, else a line now and then. What is yielded adds one."""
+    if not messages.is_terminal:
+        yield _lines
+        return
     columns = (
         TextColumn("[bold]{task.fields[title]}"),
         BarColumn(),

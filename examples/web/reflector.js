@@ -26,10 +26,10 @@ export async function loadReflector(base, glb, name) {
     }
     const diffuse = mesh.geometry.attributes._irradiance !== undefined;
     const material = (stack) => shellMaterial(stack, textures, surface, description.footprintScale, lookups, diffuse);
-    // What lies on the convex hull cannot reflect the object itself: the last shell alone.
+    // What lies on the convex hull cannot reflect the object itself.
     mesh.geometry.addGroup(0, stackIndices, 0);
     mesh.geometry.addGroup(stackIndices, mesh.geometry.index.count - stackIndices, 1);
-    mesh.material = [material(shells), material(shells.slice(-1))];
+    mesh.material = [material(shells), material(shells.filter((shell) => !shell.off_hull))];
   }
   return gltf.scene;
 }

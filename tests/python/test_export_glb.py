@@ -200,6 +200,7 @@ def test_every_level_of_every_map_comes_back(glb: Glb, baked: tuple[PemStore, Bu
                     alpha = read_level(glb, shell, level, "alpha").reshape(count) / 255.0
                     np.testing.assert_allclose(alpha, np.clip(expected[:, 3], 0, 1), atol=0.5 / 255 + 1e-6)
         assert "alpha" not in part["shells"][-1]
+        assert [shell.get("offHull", False) for shell in part["shells"]] == [True, False]
 
 
 def test_the_static_map_of_all_parts_is_there_once(glb: Glb) -> None:

@@ -137,6 +137,8 @@ def _add_shell(file: GlbFile, name: str, shell: ShellMap, code: RadianceCode) ->
         "size": shell.size,
         "radiance": file.add_png(f"{name} radiance", radiance.astype(np.uint8)),
     }
+    if shell.off_hull:
+        entry["offHull"] = True
     if shell.channels == 4:
         alpha = np.rint(255.0 * np.clip(shell.pyramid[:, 3:], 0.0, 1.0)).astype(np.uint8)
         atlas = to_atlas(alpha, shell.size).astype(np.uint8)

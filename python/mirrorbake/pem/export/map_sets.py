@@ -28,6 +28,8 @@ class ShellMap:
     """Texels along a side of a face of the finest level."""
     pyramid: FloatArray
     """(texels, C), float32: all levels, the finest first; opaque RGB, or premultiplied RGBA."""
+    off_hull: bool = False
+    """Triangles on the reflector's convex hull do not read it."""
 
     @property
     def channels(self) -> int:
@@ -100,6 +102,7 @@ def sample_set(store: PemStore, index: int) -> MapSet:
                 moved_proxy(shell.proxy, pose) if shell.moves else shell.proxy,
                 header.map_size,
                 store.read_map(part.name, shell.name, index),
+                off_hull=shell.polygons == "off hull",
             )
             for shell in part.shells
         ]

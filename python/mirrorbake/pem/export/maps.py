@@ -144,6 +144,7 @@ def _describe(shell: ShellMap, frame: Frame, files: list[str], format: str) -> d
         "size": shell.size,
         "levels": 1 if panorama else shell.levels,
         "channels": shell.channels,
+        "off_hull": shell.off_hull,
         "files": files,
     }
 

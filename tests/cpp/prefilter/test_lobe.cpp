@@ -47,9 +47,7 @@ TEST(Lobe, WidthsOfPhongAndMicrofacetsConvert) {
   }
 }
 
-// Smooth surfaces reflect everything, and Schlick's share is (1 − cos θ)^5; rough ones lose what bounces twice. Filament's
-// documentation (figure 27) has E = 0.45 for roughness 1 seen head on; the exact value of Heitz's single scattering
-// model for α = 1 and n·v → 1 is below 1 by two fifths at least.
+// Smooth surfaces reflect everything, and Schlick's share is (1 − cos θ)^5; rough ones lose what bounces twice.
 TEST(SplitSum, IsFresnelForSmoothSurfacesAndLosesLightWithRoughness) {
   for (const double cosine : {0.2, 0.5, 0.9}) {
     const SplitSum smooth = split_sum(cosine, 1e-3);

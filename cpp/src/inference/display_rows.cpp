@@ -83,7 +83,10 @@ LayerRows build_layer_rows(const FitModel& model, const DisplayView& view) {
         }
       }
     }
-    result.target[r] = view.targets->shell(row.pixel.pixel, row.part, row.shell);
+    const bool last =
+        static_cast<std::size_t>(row.shell) + 1 == model.parts[static_cast<std::size_t>(row.part)].size();
+    result.target[r] = last ? glm::vec4(view.targets->light_from(row.pixel.pixel, row.part, row.shell), 1.0F)
+                            : view.targets->shell(row.pixel.pixel, row.part, row.shell);
     result.fresnel[r] = mean * fresnel;
     result.coverage[r] = static_cast<float>(view.targets->count(row.pixel.pixel, row.part) /
                                             view.targets->samples_per_pixel());

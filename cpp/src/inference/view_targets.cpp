@@ -21,6 +21,7 @@ ViewTargets::ViewTargets(int width, int height, int parts, int shells)
   reflected_.resize(pixels);
   diffuse_.resize(pixels);
   radiance_.resize(counts_.size() * static_cast<std::size_t>(shells));
+  light_from_.resize(radiance_.size());
 }
 
 void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
@@ -49,9 +50,12 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
     ++counts_[at(pixel, samples.part[i])];
     reflected_[pixel] += glm::dvec3(light);
     diffuse_[pixel] += glm::dvec3(samples.diffuse[i]);
-    for (std::size_t k = 0; k < samples.shells.size(); ++k) {
-      radiance_[at(pixel, samples.part[i]) * samples.shells.size() + k] +=
-          glm::dvec4(samples.shells[k].radiance[i]);
+    glm::vec3 behind(0.0F);
+    for (int k = shells_ - 1; k >= 0; --k) {
+      const glm::vec4 layer = samples.shells[static_cast<std::size_t>(k)].radiance[i];
+      behind = glm::vec3(layer) + (1.0F - layer.a) * behind;
+      radiance_[at(pixel, samples.part[i], k)] += glm::dvec4(layer);
+      light_from_[at(pixel, samples.part[i], k)] += glm::dvec3(behind);
     }
   }
   if (bad > 0) {
@@ -76,8 +80,12 @@ glm::vec3 ViewTargets::diffuse(std::size_t pixel) const {
 }
 
 glm::vec4 ViewTargets::shell(std::size_t pixel, int part, int shell) const {
-  const std::size_t i = at(pixel, part) * static_cast<std::size_t>(shells_) + static_cast<std::size_t>(shell);
-  return glm::vec4(radiance_[i] / static_cast<double>(std::max(count(pixel, part), 1U)));
+  return glm::vec4(radiance_[at(pixel, part, shell)] / static_cast<double>(std::max(count(pixel, part), 1U)));
+}
+
+glm::vec3 ViewTargets::light_from(std::size_t pixel, int part, int shell) const {
+  return glm::vec3(light_from_[at(pixel, part, shell)] /
+                   static_cast<double>(std::max(count(pixel, part), 1U)));
 }
 
 }  // namespace mirrorbake

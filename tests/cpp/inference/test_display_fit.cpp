@@ -169,6 +169,24 @@ TEST(DisplayFit, MapsOfNodesBlendToTheViewsBetweenThem) {
   }
 }
 
+// A part with fewer shells than were traced shows all of them in its last: one uniform light over another.
+TEST(DisplayFit, TheLastShellHoldsWhatIsBehindItToo) {
+  const SurfaceSamples samples = ball(24, 4, [](const SurfaceSamples&, std::size_t, std::size_t k) {
+    return k == 0 ? glm::vec4(0.1F, 0.1F, 0.1F, 0.5F) : glm::vec4(2.0F, 1.0F, 0.5F, 1.0F);
+  });
+  const ViewTargets targets = targets_of(samples);
+  const DisplayView view{&samples, &targets};
+  const std::vector<FitPart> parts{{{kBox, 0}}, {{kBox, 0}}};
+  DisplayFitOptions options = precise();
+  options.layer_weight = 1.0F;
+  const DisplayFit fit = fit_display({&view, 1}, parts, {&kMap, 1}, 1, web_run_time(), options);
+  const float expected[3] = {0.1F + 0.5F * 2.0F, 0.1F + 0.5F * 1.0F, 0.1F + 0.5F * 0.5F};
+  for (std::size_t i = 0; i < fit.texels.size(); i += 4) {
+    for (std::size_t k = 0; k < 3; ++k) ASSERT_NEAR(fit.texels[i + k], expected[k], 1e-3F);
+    ASSERT_NEAR(fit.texels[i + 3], 1.0F, 1e-4F);
+  }
+}
+
 TEST(DisplayFit, SameBitsOnOneThread) {
   const std::vector<float> truth = random_maps(5);
   const SurfaceSamples samples = ball(32, 4, [&](const SurfaceSamples& s, std::size_t i, std::size_t k) {

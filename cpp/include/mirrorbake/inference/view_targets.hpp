@@ -38,8 +38,13 @@ class ViewTargets {
   glm::vec3 diffuse(std::size_t pixel) const;
   /// Mean over the samples that see the part.
   glm::vec4 shell(std::size_t pixel, int part, int shell) const;
+  /// Mean of what arrives from this shell and all behind it: what a part's last shell has to show.
+  glm::vec3 light_from(std::size_t pixel, int part, int shell) const;
 
  private:
+  std::size_t at(std::size_t pixel, int part, int shell) const {
+    return at(pixel, part) * static_cast<std::size_t>(shells_) + static_cast<std::size_t>(shell);
+  }
   std::size_t at(std::size_t pixel, int part) const {
     return pixel * static_cast<std::size_t>(parts_) + static_cast<std::size_t>(part);
   }
@@ -49,6 +54,7 @@ class ViewTargets {
   std::vector<std::uint32_t> counts_;
   std::vector<glm::dvec3> reflected_, diffuse_;
   std::vector<glm::dvec4> radiance_;
+  std::vector<glm::dvec3> light_from_;
 };
 
 }  // namespace mirrorbake

@@ -43,18 +43,22 @@ class Estimate:
         return f"about {time_of_all} and {disk} for {samples}{each}, on {threads}"
 
 
+def _two_digits(value: float) -> str:
+    return f"{float(f'{value:.2g}'):g}"
+
+
 def _seconds(seconds: float) -> str:
     for unit, length in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2.0 * length:
-            return f"{seconds / length:.2g} {unit}"
-    return f"{seconds:.2g} s"
+            return f"{_two_digits(seconds / length)} {unit}"
+    return f"{_two_digits(seconds)} s"
 
 
 def _bytes(count: float) -> str:
     for unit, length in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
         if count >= length:
-            return f"{count / length:.2g} {unit}"
-    return f"{count / 1e3:.2g} kB"
+            return f"{_two_digits(count / length)} {unit}"
+    return f"{_two_digits(count / 1e3)} kB"
 
 
 def estimate(stage: Stage, contents: Contents, samples: int) -> Estimate:

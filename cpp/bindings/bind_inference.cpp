@@ -167,14 +167,16 @@ void bind_inference(nb::module_& m) {
 
   m.def(
       "display_row_weights",
-      [](const RenderingMatrix& matrix, int samples_per_pixel, Matrix target) {
+      [](const RenderingMatrix& matrix, int samples_per_pixel, Matrix target,
+         const std::vector<std::uint32_t>& pixel_samples) {
         const int channels = static_cast<int>(target.shape(1));
-        return to_numpy(display_row_weights(matrix, samples_per_pixel, flat(target), channels),
+        return to_numpy(display_row_weights(matrix, samples_per_pixel, flat(target), channels, pixel_samples),
                         {matrix.rows(), target.shape(1)});
       },
       nb::arg("matrix"), nb::arg("samples_per_pixel"), nb::arg("target"),
+      nb::arg("pixel_samples") = std::vector<std::uint32_t>{},
       "Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2, float32 "
-      "(rows, C).");
+      "(rows, C).\n`pixel_samples` as SurfaceSamples has it stands in for samples_per_pixel.");
 
   nb::class_<SolveOptions>(m, "SolveOptions", "Weights of the regulariser and when to stop.")
       .def(

@@ -50,6 +50,10 @@ void bind_samples(nb::module_& m) {
   c.def_ro("width", &SurfaceSamples::width, "Of the image, pixels.");
   c.def_ro("height", &SurfaceSamples::height, "Of the image, pixels.");
   c.def_ro("samples_per_pixel", &SurfaceSamples::samples_per_pixel);
+  c.def_prop_ro(
+      "pixel_samples",
+      [](nb::handle self) { return scalars_view(nb::cast<const SurfaceSamples&>(self).pixel_samples, self); },
+      "(height * width,) uint32: samples traced per pixel; empty if all are `samples_per_pixel`.");
   c.def("__len__", &SurfaceSamples::size);
   using S = SurfaceSamples;
   def_scalars<&S::pixel>(c, "pixel", "(n,) uint32: y * width + x.");

@@ -84,24 +84,33 @@ void bind_tracer(nb::module_& m) {
       .def(
           "__init__",
           [](TraceOptions* self, int samples_per_pixel, int max_specular_depth, int max_diffuse_depth,
-             std::uint64_t seed, std::array<int, 4> window) {
+             std::uint64_t seed, std::array<int, 4> window, float noise, int most_samples_per_pixel) {
             new (self) TraceOptions{samples_per_pixel,
                                     max_specular_depth,
                                     max_diffuse_depth,
                                     seed,
                                     {window[0], window[1], window[2], window[3]},
+                                    noise,
+                                    most_samples_per_pixel,
                                     {}};
           },
           nb::kw_only(), nb::arg("samples_per_pixel") = TraceOptions{}.samples_per_pixel,
           nb::arg("max_specular_depth") = TraceOptions{}.max_specular_depth,
           nb::arg("max_diffuse_depth") = TraceOptions{}.max_diffuse_depth,
-          nb::arg("seed") = TraceOptions{}.seed, nb::arg("window") = std::array<int, 4>{0, 0, 0, 0})
+          nb::arg("seed") = TraceOptions{}.seed, nb::arg("window") = std::array<int, 4>{0, 0, 0, 0},
+          nb::arg("noise") = TraceOptions{}.noise,
+          nb::arg("most_samples_per_pixel") = TraceOptions{}.most_samples_per_pixel)
       .def_rw("samples_per_pixel", &TraceOptions::samples_per_pixel, "1 to 65536.")
       .def_rw("max_specular_depth", &TraceOptions::max_specular_depth,
               "Specular bounces after the first, 0 to 64.")
       .def_rw("max_diffuse_depth", &TraceOptions::max_diffuse_depth,
               "Diffuse bounces of IndirectLight.path, 0 to 64.")
       .def_rw("seed", &TraceOptions::seed)
+      .def_rw("noise", &TraceOptions::noise,
+              "0, or the standard error of a pixel's displayed value (sRGB, 0 to 1) for which trace_layers "
+              "takes more\nsamples where they are needed.")
+      .def_rw("most_samples_per_pixel", &TraceOptions::most_samples_per_pixel,
+              "Of trace_layers with `noise`, 1 to 65536.")
       .def_prop_rw(
           "window",
           [](const TraceOptions& o) {
@@ -147,7 +156,14 @@ void bind_tracer(nb::module_& m) {
       .def_prop_ro(
           "sample_beauty",
           [](nb::handle self) { return vectors_view(nb::cast<const LayerTrace&>(self).sample_beauty, self); },
-          "(n, 3): beauty value of each entry of `samples`: what the layers add up to.");
+          "(n, 3): beauty value of each entry of `samples`: what the layers add up to.")
+      .def_prop_ro(
+          "display_variance",
+          [](nb::handle self) {
+            return scalars_view(nb::cast<const LayerTrace&>(self).display_variance, self);
+          },
+          "(height * width,): squared standard error of the displayed value (sRGB, 0 to 1) of the mean of a "
+          "pixel's\ncovered samples, estimated.");
 
   nb::class_<Tracer>(
       m, "Tracer",

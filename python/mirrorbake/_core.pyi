@@ -895,6 +895,12 @@ class SurfaceSamples:
     @property
     def samples_per_pixel(self) -> int: ...
 
+    @property
+    def pixel_samples(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None,), writable=False)]:
+        """
+        (height * width,) uint32: samples traced per pixel; empty if all are `samples_per_pixel`.
+        """
+
     def __len__(self) -> int: ...
 
     @property
@@ -1090,7 +1096,7 @@ class TracerOptions:
 class TraceOptions:
     """What is decided per image."""
 
-    def __init__(self, *, samples_per_pixel: int = 16, max_specular_depth: int = 8, max_diffuse_depth: int = 4, seed: int = 0, window: Sequence[int] = [0, 0, 0, 0]) -> None: ...
+    def __init__(self, *, samples_per_pixel: int = 16, max_specular_depth: int = 8, max_diffuse_depth: int = 4, seed: int = 0, window: Sequence[int] = [0, 0, 0, 0], noise: float = 0.0, most_samples_per_pixel: int = 256) -> None: ...
 
     @property
     def samples_per_pixel(self) -> int:
@@ -1118,6 +1124,23 @@ class TraceOptions:
 
     @seed.setter
     def seed(self, arg: int, /) -> None: ...
+
+    @property
+    def noise(self) -> float:
+        """
+        0, or the standard error of a pixel's displayed value (sRGB, 0 to 1) for which trace_layers takes more
+        samples where they are needed.
+        """
+
+    @noise.setter
+    def noise(self, arg: float, /) -> None: ...
+
+    @property
+    def most_samples_per_pixel(self) -> int:
+        """Of trace_layers with `noise`, 1 to 65536."""
+
+    @most_samples_per_pixel.setter
+    def most_samples_per_pixel(self, arg: int, /) -> None: ...
 
     @property
     def window(self) -> list[int]:
@@ -1171,6 +1194,13 @@ class LayerTrace:
     def sample_beauty(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
         """
         (n, 3): beauty value of each entry of `samples`: what the layers add up to.
+        """
+
+    @property
+    def display_variance(self) -> Annotated[NDArray[numpy.float32], dict(shape=(None,), writable=False)]:
+        """
+        (height * width,): squared standard error of the displayed value (sRGB, 0 to 1) of the mean of a pixel's
+        covered samples, estimated.
         """
 
 class Tracer:

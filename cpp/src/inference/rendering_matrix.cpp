@@ -100,8 +100,13 @@ std::vector<float> multiply(const RenderingMatrix& matrix, std::span<const float
 }
 
 std::vector<float> display_row_weights(const RenderingMatrix& matrix, int samples_per_pixel,
-                                       std::span<const float> target, int channels) {
+                                       std::span<const float> target, int channels,
+                                       std::span<const std::uint32_t> pixel_samples) {
   check_range("samples_per_pixel", samples_per_pixel, 1, 1 << 20);
+  if (!pixel_samples.empty() && matrix.rows() > 0 && matrix.row_pixels.back() >= pixel_samples.size()) {
+    throw InvalidArgument("pixel_samples", std::to_string(pixel_samples.size()) + " entries",
+                          "one per pixel of the image");
+  }
   const std::size_t c = static_cast<std::size_t>(channels);
   check_length("target", target.size(), matrix.rows() * c, "rows × channels");
   std::vector<float> weights(matrix.rows() * c);
@@ -110,8 +115,9 @@ std::vector<float> display_row_weights(const RenderingMatrix& matrix, int sample
     // Luminance of Rec.709 primaries (ITU-R BT.709-6, §3.2).
     const float luminance = c >= 3 ? 0.2126F * b[0] + 0.7152F * b[1] + 0.0722F * b[2] : b[0];
     const float compression = 1.0F + std::max(luminance, 0.0F);
-    const float weight = static_cast<float>(matrix.row_samples(r)) /
-                         (static_cast<float>(samples_per_pixel) * compression * compression);
+    const float samples = pixel_samples.empty() ? static_cast<float>(samples_per_pixel)
+                                                : static_cast<float>(pixel_samples[matrix.row_pixels[r]]);
+    const float weight = static_cast<float>(matrix.row_samples(r)) / (samples * compression * compression);
     std::fill_n(weights.begin() + static_cast<std::ptrdiff_t>(r * c), c, weight);
   }
   return weights;

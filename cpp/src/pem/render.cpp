@@ -87,11 +87,11 @@ Image render_reflector(const SurfaceSamples& samples, std::span<const PartShells
   parallel_for(pixels, kPixelsPerChunk, [&](std::size_t begin, std::size_t end) {
     // Where each pixel's samples start: pixels are independent of each other, samples are in their order.
     const auto first = std::lower_bound(samples.pixel.begin(), samples.pixel.end(), begin);
-    const float mean = 1.0F / static_cast<float>(samples.samples_per_pixel);
     for (std::size_t i = static_cast<std::size_t>(first - samples.pixel.begin());
          i < samples.size() && samples.pixel[i] < end; ++i) {
       glm::vec3 light = samples.fresnel[i] * incident_light(samples, i, parts[samples.part[i]], model);
       if (!diffuse.empty()) light += diffuse[i];
+      const float mean = 1.0F / static_cast<float>(samples.samples_in(samples.pixel[i]));
       float* pixel = image.pixels.data() + std::size_t{4} * samples.pixel[i];
       for (int k = 0; k < 3; ++k) pixel[k] += mean * light[k];
       pixel[3] += mean;

@@ -1,11 +1,9 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
-#include <limits>
+#include <cstdint>
 #include <string>
-#include <type_traits>
 #include <utility>
+#include <vector>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
@@ -16,8 +14,10 @@
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "options.hpp"
+#include "pixel_layers.hpp"
 #include "primary_rays.hpp"
 #include "progress.hpp"
+#include "sample_rows.hpp"
 #include "state.hpp"
 
 namespace mirrorbake {
@@ -27,119 +27,19 @@ using tracing::CameraRays;
 using tracing::Hit;
 using tracing::LitWorld;
 using tracing::PathLimits;
+using tracing::PixelLayers;
 using tracing::PrimaryRow;
 using tracing::PrimarySample;
 using tracing::Ray;
 using tracing::RayKind;
 using tracing::RayScene;
+using tracing::Row;
 using tracing::SampleStream;
+using tracing::SpecularLayers;
 using tracing::Surface;
 using tracing::World;
 
-/// Calls `task(member)` for every array of SurfaceSamples, in parallel.
-template <typename Task>
-void for_each_array(const Task& task) {
-  using S = SurfaceSamples;
-  const auto call = [&](auto... members) {
-    const std::array<std::function<void()>, sizeof...(members)> calls{[&task, members] { task(members); }...};
-    parallel_for(calls.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) calls[i]();
-    });
-  };
-  call(&S::pixel, &S::part, &S::triangle, &S::barycentric, &S::position, &S::normal, &S::reflection,
-       &S::dposition_dx, &S::dposition_dy, &S::dreflection_dx, &S::dreflection_dy, &S::fresnel, &S::albedo,
-       &S::diffuse);
-}
-
 bool meets(const Hit& hit, int object) { return !hit.missed() && static_cast<int>(hit.geometry) == object; }
-
-/// One image row: its samples in order, and the beauty value of each where light is traced.
-struct Row {
-  SurfaceSamples samples;
-  std::vector<glm::vec3> beauty;
-};
-
-/// Moves the rows' arrays one behind the other; `array` picks one out of a row's samples.
-template <typename Array>
-auto join(std::vector<Row>& rows, const Array& array) {
-  std::size_t size = 0;
-  for (Row& row : rows) size += array(row.samples).size();
-  std::remove_reference_t<decltype(array(rows.front().samples))> whole;
-  whole.reserve(size);
-  for (Row& row : rows) {
-    auto& part = array(row.samples);
-    whole.insert(whole.end(), part.begin(), part.end());
-    part = {};
-  }
-  return whole;
-}
-
-/// The rows one after the other. Empties them.
-SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, const TraceOptions& options) {
-  SurfaceSamples all;
-  all.width = window.width;
-  all.height = window.height;
-  all.samples_per_pixel = options.samples_per_pixel;
-  for_each_array([&](auto member) {
-    all.*member = join(
-        rows, [member](SurfaceSamples & samples) -> auto& { return samples.*member; });
-  });
-  all.shells.resize(rows.front().samples.shells.size());
-  parallel_for(all.shells.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      ShellLight& shell = all.shells[k];
-      shell.name = rows.front().samples.shells[k].name;
-      shell.radiance = join(
-          rows, [k](SurfaceSamples & s) -> auto& { return s.shells[k].radiance; });
-      shell.hit_distance = join(
-          rows, [k](SurfaceSamples & s) -> auto& { return s.shells[k].hit_distance; });
-    }
-  });
-  return all;
-}
-
-void record_surface(SurfaceSamples& out, const World& world, const Surface& s, float distance,
-                    const CameraRays::Direction& ray, std::uint32_t pixel) {
-  const std::vector<std::uint16_t>& parts =
-      world.scene.objects[static_cast<std::size_t>(s.object)].mesh.parts;
-  out.pixel.push_back(pixel);
-  out.part.push_back(parts.empty() ? std::uint16_t{0} : parts[s.triangle]);
-  out.triangle.push_back(s.triangle);
-  out.barycentric.push_back(s.barycentric);
-  out.position.push_back(s.position + world.rays.origin());
-  out.normal.push_back(s.normal);
-  out.reflection.push_back(s.reflection);
-  const auto dx = tracing::surface_differential(world.scene, world.rays, s, distance, ray.dx);
-  const auto dy = tracing::surface_differential(world.scene, world.rays, s, distance, ray.dy);
-  out.dposition_dx.push_back(dx.position);
-  out.dposition_dy.push_back(dy.position);
-  out.dreflection_dx.push_back(dx.reflection);
-  out.dreflection_dy.push_back(dy.reflection);
-  out.fresnel.push_back(s.fresnel);
-  out.albedo.push_back(s.albedo);
-}
-
-/// The light that arrives along a direction of the specular lobe, split by what the ray hits first, with the distance along
-/// the direction to what each layer's ray hits.
-struct SpecularLayers {
-  glm::vec4 local{0.0F};
-  glm::vec3 distant{0.0F};
-  float local_distance = std::numeric_limits<float>::infinity();
-  float distant_distance = std::numeric_limits<float>::infinity();
-
-  glm::vec3 incident() const { return glm::vec3(local) + (1.0F - local.a) * distant; }
-};
-
-/// The shells that the layers are recorded as, front to back.
-std::vector<ShellLight> default_shells() { return {{"local", {}, {}}, {"distant", {}, {}}}; }
-
-void record_light(SurfaceSamples& out, glm::vec3 body, const SpecularLayers& specular) {
-  out.diffuse.push_back(body);
-  out.shells[0].radiance.push_back(specular.local);
-  out.shells[0].hit_distance.push_back(specular.local_distance);
-  out.shells[1].radiance.emplace_back(specular.distant, 1.0F);
-  out.shells[1].hit_distance.push_back(specular.distant_distance);
-}
 
 /// `lobe` is what next-event estimation found for the lobe.
 SpecularLayers trace_specular(const LitWorld& lit, const RayScene::View& without_reflector,
@@ -187,110 +87,6 @@ void check_eye_outside(const World& world, const Camera& camera, int reflector) 
   }
 }
 
-// Sums over the covered samples of a pixel, then their means.
-class PixelLayers {
- public:
-  void add(const Surface& s, glm::vec3 beauty, glm::vec3 body, const SpecularLayers& specular,
-           glm::vec3 position, std::uint16_t part) {
-    ++covered_;
-    beauty_ += beauty;
-    diffuse_ += body;
-    fresnel_ += s.fresnel;
-    local_ += specular.local;
-    distant_ += specular.distant;
-    if (std::isfinite(specular.distant_distance)) {
-      distance_ += specular.distant_distance;
-      ++finite_distances_;
-    }
-    reflection_ += s.reflection;
-    normal_ += s.normal;
-    position_ += position;
-    parts_.push_back(part);
-  }
-
-  /// Writes everything but the beauty, in the order of `channel_names`.
-  void write(float* out, int samples) {
-    const auto put = [&](const auto& sum) {
-      const double share = covered_ > 0 ? 1.0 / covered_ : 0.0;
-      for (int i = 0; i < sum.length(); ++i) *out++ = static_cast<float>(sum[i] * share);
-    };
-    *out++ = static_cast<float>(covered_) / static_cast<float>(samples);
-    put(diffuse_);
-    put(fresnel_);
-    put(local_);
-    put(distant_);
-    *out++ = covered_ == 0            ? 0.0F
-             : finite_distances_ == 0 ? std::numeric_limits<float>::infinity()
-                                      : static_cast<float>(distance_ / finite_distances_);
-    put(reflection_);
-    put(normal_);
-    put(position_);
-    *out++ = static_cast<float>(most_frequent_part());
-    const double share = covered_ > 0 ? 1.0 / covered_ : 0.0;
-    const glm::dvec3 of_means =
-        diffuse_ + fresnel_ * share * (glm::dvec3(local_) + (1.0 - local_.a * share) * distant_);
-    put(beauty_ - of_means);
-  }
-
- private:
-  int most_frequent_part() {
-    std::sort(parts_.begin(), parts_.end());
-    int best = -1;
-    std::ptrdiff_t most = 0;
-    for (auto p = parts_.begin(); p != parts_.end();) {
-      const auto end = std::upper_bound(p, parts_.end(), *p);
-      if (end - p > most) {
-        most = end - p;
-        best = *p;
-      }
-      p = end;
-    }
-    return best;
-  }
-
-  int covered_ = 0;
-  int finite_distances_ = 0;
-  double distance_ = 0.0;
-  glm::dvec3 beauty_{0.0}, diffuse_{0.0}, fresnel_{0.0}, distant_{0.0}, reflection_{0.0}, normal_{0.0},
-      position_{0.0};
-  glm::dvec4 local_{0.0};
-  std::vector<std::uint16_t> parts_;
-};
-
-std::vector<std::string> channel_names() {
-  return {"R",
-          "G",
-          "B",
-          "coverage",
-          "diffuse.R",
-          "diffuse.G",
-          "diffuse.B",
-          "fresnel.R",
-          "fresnel.G",
-          "fresnel.B",
-          "specular_local.R",
-          "specular_local.G",
-          "specular_local.B",
-          "specular_local.A",
-          "specular_distant.R",
-          "specular_distant.G",
-          "specular_distant.B",
-          "distance",
-          "reflection.X",
-          "reflection.Y",
-          "reflection.Z",
-          "normal.X",
-          "normal.Y",
-          "normal.Z",
-          "position.X",
-          "position.Y",
-          "position.Z",
-          "part",
-          "covariance.R",
-          "covariance.G",
-          "covariance.B"};
-}
-
 void check_reflector(const World& world, const Camera& camera, int reflector) {
   const auto count = static_cast<int>(world.scene.objects.size());
   if (reflector < 0 || reflector >= count) {
@@ -329,6 +125,223 @@ std::uint32_t pixel_number(const PixelWindow& window, std::size_t y, int x) {
          static_cast<std::uint32_t>(x);
 }
 
+/// One call of trace_layers.
+class LayerTracer {
+ public:
+  LayerTracer(const LitWorld& lit, const Camera& camera, const PixelWindow& window,
+              const TraceOptions& options, std::span<const int> reflectors)
+      : lit_(lit),
+        camera_(camera),
+        rays_(camera),
+        window_(window),
+        options_(options),
+        limits_{options.max_specular_depth, options.max_diffuse_depth},
+        number_of_object_(lit.world.scene.objects.size(), -1),
+        traces_(reflectors.size()),
+        rows_(reflectors.size()) {
+    for (std::size_t r = 0; r < reflectors.size(); ++r) {
+      number_of_object_[static_cast<std::size_t>(reflectors[r])] = static_cast<int>(r);
+      without_.push_back(lit.world.rays.without({&reflectors[r], 1}));
+      traces_[r].layers = Image(window.width, window.height, tracing::layer_channels());
+      const std::size_t pixels =
+          static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
+      traces_[r].display_variance.resize(pixels);
+      rows_[r].resize(static_cast<std::size_t>(window.height));
+      for (Row& row : rows_[r]) row.samples.shells = tracing::default_shells();
+    }
+  }
+
+  /// The same number of samples everywhere.
+  void trace();
+  /// More samples where the reflectors are noisy.
+  void trace_to_noise();
+
+  std::vector<LayerTrace> take();
+
+ private:
+  using Pixels = std::vector<std::vector<PixelLayers>>;  // per reflector
+
+  /// A piece of an image row, in pixels of the image.
+  struct Piece {
+    int y = 0;
+    int x = 0;
+    int columns = 0;
+    int first_sample = 0;
+    int samples = 0;
+  };
+  void trace_piece(const Piece& piece, std::size_t first_pixel, Pixels& pixels);
+  void add_sample(const PrimarySample& sample, int x, int y, std::size_t pixel, Pixels& pixels);
+  void write(int x, int y, std::size_t pixel, const Pixels& pixels);
+  int wanted_samples(const Pixels& pixels, const PixelWindow& area, int x, int y) const;
+  bool in_window(int x, int y) const {
+    return x >= window_.x && y >= window_.y && x < window_.x + window_.width &&
+           y < window_.y + window_.height;
+  }
+
+  const LitWorld& lit_;
+  const Camera& camera_;
+  CameraRays rays_;
+  PixelWindow window_;
+  const TraceOptions& options_;
+  PathLimits limits_;
+  std::vector<int> number_of_object_;
+  std::vector<RayScene::View> without_;  // each reflector
+  std::vector<LayerTrace> traces_;
+  std::vector<std::vector<Row>> rows_;  // of the window, per reflector
+  std::vector<std::uint32_t> pixel_samples_;
+};
+
+void LayerTracer::add_sample(const PrimarySample& sample, int x, int y, std::size_t pixel, Pixels& pixels) {
+  const World& world = lit_.world;
+  const bool on_object = !sample.hit.missed() && !world.is_light(sample.hit);
+  const int number = on_object ? number_of_object_[sample.hit.geometry] : -1;
+  if (number < 0) {
+    const glm::vec3 value = tracing::radiance(lit_, sample.ray, sample.hit, limits_, sample.stream, 0, 0.0F);
+    for (auto& of_reflector : pixels) of_reflector[pixel].add_other(value);
+    return;
+  }
+  const auto r = static_cast<std::size_t>(number);
+  const Surface surface = tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
+  const tracing::ScatteredLight scattered =
+      tracing::scattered_light(lit_, surface, limits_, sample.stream, 0);
+  const glm::vec3 body = surface.emission + scattered.body;
+  const SpecularLayers specular =
+      trace_specular(lit_, without_[r], surface, scattered.lobe, limits_, sample.stream);
+  const glm::vec3 value = body + surface.fresnel * specular.incident();
+  for (std::size_t other = 0; other < pixels.size(); ++other) {
+    if (other != r) pixels[other][pixel].add_other(value);
+  }
+  const std::vector<std::uint16_t>& parts = world.scene.objects[sample.hit.geometry].mesh.parts;
+  const std::uint16_t part = parts.empty() ? std::uint16_t{0} : parts[surface.triangle];
+  pixels[r][pixel].add(surface, value, body, specular, surface.position + world.rays.origin(), part);
+  if (!in_window(x, y)) return;
+  Row& row = rows_[r][static_cast<std::size_t>(y - window_.y)];
+  tracing::record_surface(row.samples, world, surface, sample.hit.distance,
+                          rays_.direction_with_differentials(sample.point),
+                          pixel_number(window_, static_cast<std::size_t>(y - window_.y), x - window_.x));
+  tracing::record_light(row.samples, body, specular);
+  row.beauty.push_back(value);
+}
+
+/// `first_pixel`: that of the piece's first pixel in `pixels`.
+void LayerTracer::trace_piece(const Piece& piece, std::size_t first_pixel, Pixels& pixels) {
+  const glm::vec3 eye = camera_.eye - lit_.world.rays.origin();
+  const tracing::RowSegment segment{camera_.width,      piece.y,      piece.x, piece.columns,
+                                    piece.first_sample, piece.samples};
+  PrimaryRow primary(lit_.world.rays.all(), options_.seed, segment, [&](glm::vec2 point) {
+    return Ray{eye, rays_.direction(point)};
+  });
+  for (int x = 0; x < piece.columns; ++x) {
+    const std::size_t pixel = first_pixel + static_cast<std::size_t>(x);
+    for (auto& of_reflector : pixels) of_reflector[pixel].plan(piece.first_sample + piece.samples);
+    for (int i = 0; i < piece.samples; ++i) {
+      add_sample(primary.next(), piece.x + x, piece.y, pixel, pixels);
+    }
+  }
+}
+
+void LayerTracer::write(int x, int y, std::size_t pixel, const Pixels& pixels) {
+  for (std::size_t r = 0; r < traces_.size(); ++r) {
+    pixels[r][pixel].write(traces_[r].layers.at(x - window_.x, y - window_.y));
+    traces_[r]
+        .display_variance[pixel_number(window_, static_cast<std::size_t>(y - window_.y), x - window_.x)] =
+        static_cast<float>(pixels[r][pixel].display_variance());
+  }
+}
+
+void LayerTracer::trace() {
+  tracing::ProgressCounter progress(options_, static_cast<std::size_t>(window_.height));
+  parallel_for(static_cast<std::size_t>(window_.height), 1, [&](std::size_t begin, std::size_t end) {
+    for (auto y = window_.y + static_cast<int>(begin); y < window_.y + static_cast<int>(end); ++y) {
+      Pixels pixels(traces_.size(), std::vector<PixelLayers>(static_cast<std::size_t>(window_.width)));
+      trace_piece({y, window_.x, window_.width, 0, options_.samples_per_pixel}, 0, pixels);
+      for (int x = 0; x < window_.width; ++x) write(window_.x + x, y, static_cast<std::size_t>(x), pixels);
+      progress.step();
+    }
+  });
+}
+
+// By what the eight pixels around it vary by, never by its own samples: so their mean stays unbiased, and nothing that was
+// traced is thrown away.
+int LayerTracer::wanted_samples(const Pixels& pixels, const PixelWindow& area, int x, int y) const {
+  double largest = 0.0;
+  for (const auto& of_reflector : pixels) {
+    double variance = 0.0;
+    int count = 0;
+    for (int j = std::max(y - 1, area.y); j <= std::min(y + 1, area.y + area.height - 1); ++j) {
+      for (int i = std::max(x - 1, area.x); i <= std::min(x + 1, area.x + area.width - 1); ++i) {
+        if (i == x && j == y) continue;
+        const PixelLayers& near =
+            of_reflector[pixel_number(area, static_cast<std::size_t>(j - area.y), i - area.x)];
+        if (near.covered() == 0) continue;
+        variance += near.display_variance();
+        ++count;
+      }
+    }
+    if (count > 0) largest = std::max(largest, variance / count);
+  }
+  const double limit = static_cast<double>(options_.noise) * static_cast<double>(options_.noise);
+  int samples = options_.samples_per_pixel;
+  while (largest * options_.samples_per_pixel > limit * samples &&
+         2 * samples <= options_.most_samples_per_pixel) {
+    samples *= 2;
+  }
+  return samples;
+}
+
+void LayerTracer::trace_to_noise() {
+  // One pixel more all around, so that a window has the samples of the whole image.
+  PixelWindow area;
+  area.x = std::max(0, window_.x - 1);
+  area.y = std::max(0, window_.y - 1);
+  area.width = std::min(camera_.width, window_.x + window_.width + 1) - area.x;
+  area.height = std::min(camera_.height, window_.y + window_.height + 1) - area.y;
+  const auto width = static_cast<std::size_t>(area.width);
+  const auto height = static_cast<std::size_t>(area.height);
+  Pixels pixels(traces_.size(), std::vector<PixelLayers>(width * height));
+  tracing::ProgressCounter progress(options_, height + static_cast<std::size_t>(window_.height));
+  parallel_for(height, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      trace_piece({area.y + static_cast<int>(row), area.x, area.width, 0, options_.samples_per_pixel},
+                  row * width, pixels);
+      progress.step();
+    }
+  });
+  pixel_samples_.resize(static_cast<std::size_t>(window_.width) * static_cast<std::size_t>(window_.height));
+  for (int y = 0; y < window_.height; ++y) {
+    for (int x = 0; x < window_.width; ++x) {
+      pixel_samples_[pixel_number(window_, static_cast<std::size_t>(y), x)] =
+          static_cast<std::uint32_t>(wanted_samples(pixels, area, window_.x + x, window_.y + y));
+    }
+  }
+  parallel_for(static_cast<std::size_t>(window_.height), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      const int y = window_.y + static_cast<int>(row);
+      for (int x = window_.x; x < window_.x + window_.width; ++x) {
+        const auto samples = static_cast<int>(pixel_samples_[pixel_number(window_, row, x - window_.x)]);
+        const int first = options_.samples_per_pixel;
+        const std::size_t pixel = pixel_number(area, static_cast<std::size_t>(y - area.y), x - area.x);
+        if (samples > first) trace_piece({y, x, 1, first, samples - first}, pixel, pixels);
+        write(x, y, pixel, pixels);
+      }
+      for (auto& rows : rows_) tracing::sort_by_pixel(rows[row]);
+      progress.step();
+    }
+  });
+}
+
+std::vector<LayerTrace> LayerTracer::take() {
+  for (std::size_t r = 0; r < traces_.size(); ++r) {
+    traces_[r].samples = tracing::concatenate(rows_[r], window_, options_);
+    traces_[r].samples.pixel_samples = pixel_samples_;
+    traces_[r].sample_beauty.reserve(traces_[r].samples.size());
+    for (const Row& row : rows_[r]) {
+      traces_[r].sample_beauty.insert(traces_[r].sample_beauty.end(), row.beauty.begin(), row.beauty.end());
+    }
+  }
+  return std::move(traces_);
+}
+
 }  // namespace
 
 LayerTrace Tracer::trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const {
@@ -337,84 +350,27 @@ LayerTrace Tracer::trace_layers(const Camera& camera, int reflector, const Trace
 
 std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<const int> reflectors,
                                              const TraceOptions& options) const {
-  const LitWorld& lit = state_->lit;
-  const World& world = lit.world;
+  const World& world = state_->lit.world;
   validate(camera);
   tracing::validate(options);
   const PixelWindow window = tracing::window_in(options, camera.width, camera.height);
-  std::vector<int> number_of_object(world.scene.objects.size(), -1);
-  std::vector<RayScene::View> without;
+  std::vector<bool> seen(world.scene.objects.size(), false);
   for (int reflector : reflectors) {
     check_reflector(world, camera, reflector);
-    int& number = number_of_object[static_cast<std::size_t>(reflector)];
-    if (number >= 0) {
+    const auto number = static_cast<std::size_t>(reflector);
+    if (seen[number]) {
       throw InvalidArgument("reflectors", "object " + std::to_string(reflector) + " twice",
                             "different objects");
     }
-    number = static_cast<int>(without.size());
-    without.push_back(world.rays.without({&reflector, 1}));
+    seen[number] = true;
   }
-  const CameraRays rays(camera);
-  const PathLimits limits{options.max_specular_depth, options.max_diffuse_depth};
-
-  std::vector<LayerTrace> traces(reflectors.size());
-  std::vector<std::vector<Row>> rows(reflectors.size());
-  for (std::size_t r = 0; r < traces.size(); ++r) {
-    traces[r].layers = Image(window.width, window.height, channel_names());
-    rows[r].resize(static_cast<std::size_t>(window.height));
-    for (Row& row : rows[r]) row.samples.shells = default_shells();
+  LayerTracer tracer(state_->lit, camera, window, options, reflectors);
+  if (options.noise > 0.0F) {
+    tracer.trace_to_noise();
+  } else {
+    tracer.trace();
   }
-  tracing::ProgressCounter progress(options, static_cast<std::size_t>(window.height));
-  parallel_for(static_cast<std::size_t>(window.height), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t y = begin; y < end; ++y) {
-      auto primary = primary_row(world, camera, rays, window, options, y);
-      std::vector<PixelLayers> means;
-      for (int x = 0; x < window.width; ++x) {
-        glm::dvec3 beauty(0.0);
-        means.assign(traces.size(), {});
-        for (int i = 0; i < options.samples_per_pixel; ++i) {
-          const PrimarySample& sample = primary.next();
-          const bool on_object = !sample.hit.missed() && !world.is_light(sample.hit);
-          const int number = on_object ? number_of_object[sample.hit.geometry] : -1;
-          if (number < 0) {
-            beauty +=
-                glm::dvec3(tracing::radiance(lit, sample.ray, sample.hit, limits, sample.stream, 0, 0.0F));
-            continue;
-          }
-          const auto r = static_cast<std::size_t>(number);
-          const Surface surface =
-              tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
-          const tracing::ScatteredLight scattered =
-              tracing::scattered_light(lit, surface, limits, sample.stream, 0);
-          const glm::vec3 body = surface.emission + scattered.body;
-          const SpecularLayers specular =
-              trace_specular(lit, without[r], surface, scattered.lobe, limits, sample.stream);
-          const glm::vec3 value = body + surface.fresnel * specular.incident();
-          beauty += glm::dvec3(value);
-          SurfaceSamples& out = rows[r][y].samples;
-          record_surface(out, world, surface, sample.hit.distance,
-                         rays.direction_with_differentials(sample.point), pixel_number(window, y, x));
-          record_light(out, body, specular);
-          rows[r][y].beauty.push_back(value);
-          means[r].add(surface, value, body, specular, out.position.back(), out.part.back());
-        }
-        for (std::size_t r = 0; r < traces.size(); ++r) {
-          float* channels = traces[r].layers.at(x, static_cast<int>(y));
-          for (int c = 0; c < 3; ++c) channels[c] = static_cast<float>(beauty[c] / options.samples_per_pixel);
-          means[r].write(channels + 3, options.samples_per_pixel);
-        }
-      }
-      progress.step();
-    }
-  });
-  for (std::size_t r = 0; r < traces.size(); ++r) {
-    traces[r].samples = concatenate(rows[r], window, options);
-    traces[r].sample_beauty.reserve(traces[r].samples.size());
-    for (const Row& row : rows[r]) {
-      traces[r].sample_beauty.insert(traces[r].sample_beauty.end(), row.beauty.begin(), row.beauty.end());
-    }
-  }
-  return traces;
+  return tracer.take();
 }
 
 SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
@@ -441,13 +397,14 @@ SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
           if (!meets(sample.hit, reflector)) continue;
           const Surface surface =
               tracing::surface_at(world.scene, world.rays, sample.hit, sample.ray.direction);
-          record_surface(rows[y].samples, world, surface, sample.hit.distance,
-                         rays.direction_with_differentials(sample.point), pixel_number(window, y, x));
+          tracing::record_surface(rows[y].samples, world, surface, sample.hit.distance,
+                                  rays.direction_with_differentials(sample.point),
+                                  pixel_number(window, y, x));
         }
       }
     }
   });
-  return concatenate(rows, window, options);
+  return tracing::concatenate(rows, window, options);
 }
 
 }  // namespace mirrorbake

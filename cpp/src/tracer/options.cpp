@@ -28,6 +28,14 @@ void validate(const TraceOptions& options) {
   check_range("samples_per_pixel", options.samples_per_pixel, 1, 65536);
   check_range("max_specular_depth", options.max_specular_depth, 0, 64);
   check_range("max_diffuse_depth", options.max_diffuse_depth, 0, 64);
+  check_range("most_samples_per_pixel", options.most_samples_per_pixel, 1, 65536);
+  if (!(options.noise >= 0.0F && options.noise <= 1.0F)) {
+    throw InvalidArgument("noise", text_of(options.noise), "0 to 1");
+  }
+  if (options.noise > 0.0F && options.samples_per_pixel % 4 != 0) {
+    throw InvalidArgument("samples_per_pixel", std::to_string(options.samples_per_pixel),
+                          "a multiple of 4 where the noise decides");
+  }
 }
 
 PixelWindow window_in(const TraceOptions& options, int width, int height) {

@@ -43,14 +43,13 @@ def images_of_trace(trace: _core.LayerTrace) -> ViewImages:
     total = np.stack(
         [np.bincount(pixel, weights=beauty[:, c], minlength=count.size) for c in range(3)], axis=-1
     )
-    coverage = (count / samples.samples_per_pixel).reshape(shape)
+    traced = np.asarray(samples.pixel_samples) if len(samples.pixel_samples) else samples.samples_per_pixel
+    coverage = (count / traced).reshape(shape)
     light = (total / np.maximum(count, 1)[:, None]).reshape(*shape, 3)
     channels = list(trace.channels)
-    picture = np.asarray(trace.layers)[..., [channels.index(name) for name in "RGB"]]
-    # Where the object covers the whole pixel the difference is rounding, not light.
-    background = np.where(coverage[..., None] < 1.0, picture - coverage[..., None] * light, 0.0)
+    background = np.asarray(trace.layers)[..., [channels.index(f"background.{name}") for name in "RGB"]]
     return ViewImages(
         object=light.astype(np.float32),
         coverage=coverage.astype(np.float32),
-        background=np.maximum(background, 0.0).astype(np.float32),
+        background=background.astype(np.float32),
     )

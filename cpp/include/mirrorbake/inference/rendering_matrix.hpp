@@ -63,8 +63,10 @@ std::vector<float> multiply(const RenderingMatrix& matrix, std::span<const float
 
 /// Row weights for a target that will be looked at on a display: coverage (samples of the row over samples per pixel)
 /// over (1 + luminance)², since a display compresses what is bright, and least squares would spend the map on lights.
-/// Returns one weight per row and channel.
+/// Returns one weight per row and channel. `pixel_samples` as in SurfaceSamples: empty, or the samples of every pixel in
+/// place of samples_per_pixel.
 std::vector<float> display_row_weights(const RenderingMatrix& matrix, int samples_per_pixel,
-                                       std::span<const float> target, int channels);
+                                       std::span<const float> target, int channels,
+                                       std::span<const std::uint32_t> pixel_samples = {});
 
 }  // namespace mirrorbake

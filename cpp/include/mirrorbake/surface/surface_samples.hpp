@@ -28,6 +28,8 @@ struct SurfaceSamples {
   int width = 0;   ///< of the image, pixels
   int height = 0;  ///< of the image, pixels
   int samples_per_pixel = 0;
+  /// Samples traced per pixel, whatever they saw: one entry per pixel, or none if all are `samples_per_pixel`.
+  std::vector<std::uint32_t> pixel_samples;
 
   std::vector<std::uint32_t> pixel;     ///< y · width + x
   std::vector<std::uint16_t> part;      ///< part of the reflector
@@ -54,6 +56,10 @@ struct SurfaceSamples {
   std::vector<ShellLight> shells;
 
   std::size_t size() const { return pixel.size(); }
+  /// Samples traced in pixel number `p`.
+  std::uint32_t samples_in(std::size_t p) const {
+    return pixel_samples.empty() ? static_cast<std::uint32_t>(samples_per_pixel) : pixel_samples[p];
+  }
 };
 
 }  // namespace mirrorbake

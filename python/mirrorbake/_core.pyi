@@ -896,7 +896,7 @@ class SurfaceSamples:
     def samples_per_pixel(self) -> int: ...
 
     @property
-    def pixel_samples(self) -> Annotated[NDArray[numpy.uint32], dict(shape=(None,), writable=False)]:
+    def pixel_samples(self) -> Annotated[NDArray[numpy.uint32], dict(writable=False)]:
         """
         (height * width,) uint32: samples traced per pixel; empty if all are `samples_per_pixel`.
         """
@@ -1197,7 +1197,7 @@ class LayerTrace:
         """
 
     @property
-    def display_variance(self) -> Annotated[NDArray[numpy.float32], dict(shape=(None,), writable=False)]:
+    def display_variance(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
         """
         (height * width,): squared standard error of the displayed value (sRGB, 0 to 1) of the mean of a pixel's
         covered samples, estimated.
@@ -1584,9 +1584,10 @@ def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, top
     0 for each triangle of the reflector whose samples are left out; None: all count.
     """
 
-def display_row_weights(matrix: RenderingMatrix, samples_per_pixel: int, target: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+def display_row_weights(matrix: RenderingMatrix, samples_per_pixel: int, target: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], pixel_samples: Sequence[int] = []) -> NDArray[numpy.float32]:
     """
     Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2, float32 (rows, C).
+    `pixel_samples` as SurfaceSamples has it stands in for samples_per_pixel.
     """
 
 class SolveOptions:

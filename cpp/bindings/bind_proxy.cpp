@@ -90,8 +90,8 @@ void check_rays(const RayArray<Real>& positions, const char* second, const RayAr
   if (!same) throw InvalidArgument(second, "of shape " + shape_text(directions), "the shape of positions");
 }
 
-/// Calls `compute(first, second, results)` on arrays of xyz triples and returns the results in their shape, or with
-/// the number of `layers`, if any, before it.
+/// Calls `compute(first, second, results)` on arrays of xyz triples and returns the results in their shape,
+/// or with the number of `layers`, if any, before it.
 template <typename Real, typename Compute>
 nb::ndarray<nb::numpy, Real> map_triples(const RayArray<Real>& first, const RayArray<Real>& second,
                                          std::optional<std::size_t> layers, Compute compute) {

@@ -110,8 +110,8 @@ struct Convert {
     output.save(result, json);
   }
 
-  // Of directions in the result to those in the input, by Rodrigues' formula: the surroundings turn clockwise for
-  // somebody whom the axis points at, about +Y from −Z towards +X.
+  // Of directions in the result to those in the input, by Rodrigues' formula: the surroundings turn clockwise
+  // for somebody whom the axis points at, about +Y from −Z towards +X.
   glm::mat3 rotation() const {
     const glm::vec3 given(axis[0], axis[1], axis[2]);
     if (!std::isfinite(glm::length(given)) || !(glm::length(given) > 0.0F)) {
@@ -168,7 +168,8 @@ void write_mips(const EnvMap& map, MipFilter filter, const Output& output, bool 
   }
 }
 
-// The widened faces are no environment map any more; they are packed like one, by default one below the other.
+// The widened faces are no environment map any more; they are packed like one, by default one below the
+// other.
 void write_border(const EnvMap& map, int border, Output output, bool json) {
   if (is_ktx2(output.path)) {
     throw InvalidArgument("--output", output.path, "an image: faces with borders make no cube map");

@@ -101,7 +101,8 @@ void write_table(const Options& options) {
   std::fprintf(stderr, "%zu entries, largest error %.3g\n", size, max_error);
 }
 
-// Plot --------------------------------------------------------------------------------------------------------------
+// Plot
+// -----------------------------------------------------------------------------------------------------------
 
 constexpr double kPlotWidth = 560, kPlotHeight = 360,
                  kPlotMargin = 56;  // of the axes and around them, in pixels
@@ -210,7 +211,8 @@ void print_metal(const Options& options) {
   if (options.json) std::printf("}\n");
 }
 
-// Report ------------------------------------------------------------------------------------------------------------
+// Report
+// -----------------------------------------------------------------------------------------------------------
 
 constexpr std::size_t kReportCount = std::size_t{1} << 20;
 

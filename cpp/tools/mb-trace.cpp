@@ -1,4 +1,5 @@
-// mb-trace: path-traced images of a scene, the segmented layers of its reflectors, and environment maps of it.
+// mb-trace: path-traced images of a scene, the segmented layers of its reflectors, and environment maps of
+// it.
 
 #include <CLI/CLI.hpp>
 #include <unistd.h>

@@ -58,9 +58,9 @@ inline void warn_of_losses(const char* program, const std::string& path, const S
   }
 }
 
-/// The program's exit status: what `run` returns (0 done, 2 usage), 2 for an argument with a value that it does not
-/// take, 3 for a file that cannot be read, makes no sense or cannot be written, 4 for a computation without an answer;
-/// all of them with a message on stderr.
+/// The program's exit status: what `run` returns (0 done, 2 usage), 2 for an argument with a value that it
+/// does not take, 3 for a file that cannot be read, makes no sense or cannot be written, 4 for a computation
+/// without an answer; all of them with a message on stderr.
 template <typename Run>
 int exit_status(const char* program, const Run& run) {
   try {

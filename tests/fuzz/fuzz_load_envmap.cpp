@@ -1,5 +1,5 @@
-// Bytes as an image or KTX2 file. The first byte chooses how it is read: the extension, then the arrangement of faces and
-// the projection.
+// Bytes as an image or KTX2 file. The first byte chooses how it is read: the extension, then the arrangement
+// of faces and the projection.
 #include <unistd.h>
 
 #include <cstddef>

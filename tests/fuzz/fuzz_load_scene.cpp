@@ -1,5 +1,5 @@
-// Bytes as a scene of up to three files: the first byte chooses the format; a line "%%image%%" or "%%library%%" starts
-// the file image.png or library.mtl that the scene may refer to.
+// Bytes as a scene of up to three files: the first byte chooses the format; a line "%%image%%" or
+// "%%library%%" starts the file image.png or library.mtl that the scene may refer to.
 #include <unistd.h>
 
 #include <algorithm>

@@ -43,6 +43,7 @@ PYTHON_FLOORS = ("scene", "pem", "bake", "evaluate", "study", "viewer", "command
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 MAX_LINES = 600
+MAX_COLUMNS = 110
 MAX_LIBRARY_LINES = {".py": 400, ".cpp": 500, ".hpp": 500}
 """Of the library's own files."""
 
@@ -202,6 +203,18 @@ def test_no_file_of_the_library_is_two() -> None:
         if path.suffix in MAX_LIBRARY_LINES and (lines := text.count("\n")) > MAX_LIBRARY_LINES[path.suffix]
     }
     assert not too_long
+
+
+def test_comments_of_the_library_fit_the_columns() -> None:
+    """What clang-format leaves alone; the rows of tables are as wide as they are."""
+    too_wide = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for path, text in text_files()
+        if path.suffix in {".cpp", ".hpp"} and path.is_relative_to(CPP)
+        for number, line in enumerate(text.splitlines(), 1)
+        if len(line) > MAX_COLUMNS and "//" in line and not line.lstrip().startswith("/// |")
+    ]
+    assert not too_wide
 
 
 def test_files_hold_no_unfinished_work_and_no_private_paths() -> None:

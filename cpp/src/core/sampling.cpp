@@ -21,8 +21,8 @@ std::uint32_t laine_karras_permutation(std::uint32_t x, std::uint32_t seed) {
   return x;
 }
 
-// The second Sobol dimension of an index, its bits reversed. The generator matrix is Pascal's triangle mod 2, the
-// Kronecker power of ((1, 1), (0, 1)), and so takes one step per factor.
+// The second Sobol dimension of an index, its bits reversed. The generator matrix is Pascal's triangle mod 2,
+// the Kronecker power of ((1, 1), (0, 1)), and so takes one step per factor.
 std::uint32_t reversed_sobol_second_dimension(std::uint32_t index) {
   index ^= index >> 16;
   index ^= (index & 0xff00ff00u) >> 8;
@@ -36,8 +36,8 @@ std::uint32_t reversed_sobol_second_dimension(std::uint32_t index) {
 glm::vec2 sobol_2d(std::uint32_t index, std::uint64_t sequence) {
   const std::uint64_t seeds = hash64(sequence);
   const std::uint64_t more_seeds = hash64(seeds);
-  // An Owen scramble is the permutation between two reversals. Those that cancel are left out: of the first Sobol
-  // dimension, which is the index reversed, and of the second.
+  // An Owen scramble is the permutation between two reversals. Those that cancel are left out: of the first
+  // Sobol dimension, which is the index reversed, and of the second.
   const std::uint32_t shuffled =
       reverse_bits(laine_karras_permutation(reverse_bits(index), static_cast<std::uint32_t>(seeds)));
   const std::uint32_t x =

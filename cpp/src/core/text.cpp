@@ -7,8 +7,8 @@
 namespace mirrorbake {
 namespace {
 
-// Bytes of the valid sequence that `text` starts with, 0 if there is none (RFC 3629 §4): neither overlong, nor a
-// surrogate, nor beyond U+10FFFF.
+// Bytes of the valid sequence that `text` starts with, 0 if there is none (RFC 3629 §4): neither overlong,
+// nor a surrogate, nor beyond U+10FFFF.
 std::size_t sequence_length(std::string_view text) {
   const auto byte = [&](std::size_t i) {
     return i < text.size() ? static_cast<std::uint32_t>(static_cast<unsigned char>(text[i])) : 0U;

@@ -17,8 +17,8 @@ namespace {
 constexpr std::array<std::string_view, 6> kNames = {"mirrorbake", "openexr", "oiio",
                                                     "mitsuba",    "threejs", "ktx2"};
 
-// The foreign texel of a direction is the one that our projection gives to foreign_from_native · direction; of a cube,
-// the faces ±Z may trade places after that.
+// The foreign texel of a direction is the one that our projection gives to foreign_from_native · direction;
+// of a cube, the faces ±Z may trade places after that.
 struct Orientation {
   glm::dmat3 foreign_from_native{1.0};
   bool swaps_z_faces = false;
@@ -27,8 +27,8 @@ struct Orientation {
 glm::dmat3 columns(glm::dvec3 of_x, glm::dvec3 of_y, glm::dvec3 of_z) { return {of_x, of_y, of_z}; }
 
 std::optional<Orientation> panorama(std::string_view name) {
-  // Direction in our panorama, in the centre or right of it, of what the foreign one has there: where our texel looks
-  // along −Z, +X and +Y, the foreign one looks along its centre, right and up.
+  // Direction in our panorama, in the centre or right of it, of what the foreign one has there: where our
+  // texel looks along −Z, +X and +Y, the foreign one looks along its centre, right and up.
   const auto looking = [](glm::dvec3 center, glm::dvec3 right, glm::dvec3 up) {
     return Orientation{glm::transpose(columns(right, up, -center))};
   };
@@ -42,8 +42,8 @@ std::optional<Orientation> panorama(std::string_view name) {
 std::optional<Orientation> cube(std::string_view name) {
   if (name == "mirrorbake" || name == "ktx2") return Orientation{};
   if (name == "threejs") return Orientation{columns({-1, 0, 0}, {0, 1, 0}, {0, 0, 1})};
-  // ImfEnvmap.h draws +Z with x to the left and y up, −Z with x to the right, +X with z to the right, −X with z to the
-  // left, +Y with z up, −Y with z down: OpenGL's faces with z reversed, where ±Z trade places.
+  // ImfEnvmap.h draws +Z with x to the left and y up, −Z with x to the right, +X with z to the right, −X with
+  // z to the left, +Y with z up, −Y with z down: OpenGL's faces with z reversed, where ±Z trade places.
   if (name == "openexr") return Orientation{columns({1, 0, 0}, {0, 1, 0}, {0, 0, -1}), true};
   return std::nullopt;
 }

@@ -92,8 +92,8 @@ std::string face_path(const std::string& path, const Projection& projection, int
 
 bool names_faces(const std::string& path) { return path.find("{}") != std::string::npos; }
 
-// A cube that nothing else looks like. Photographs are 3:2 and 4:3, as grids and crosses are: of a cross the cells that
-// hold no face are all of one colour.
+// A cube that nothing else looks like. Photographs are 3:2 and 4:3, as grids and crosses are: of a cross the
+// cells that hold no face are all of one colour.
 std::optional<FaceLayout> recognised_cube(const Image& image) {
   if (image.width == 6 * image.height) return FaceLayout::strip;
   if (image.height == 6 * image.width) return FaceLayout::column;

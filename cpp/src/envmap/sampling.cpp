@@ -28,7 +28,8 @@ struct TexelDifferentials {
 TexelDifferentials texel_differentials(const EnvMapLayout& layout, const MapPoint& point,
                                        glm::dvec3 direction, glm::dvec3 ddx, glm::dvec3 ddy) {
   const MapJacobian j = map_jacobian(layout.projection, point.face, point.x, point.y);
-  // Least squares J (x, y) = d: the metric of the map, bounded away from zero at a pole, where x has no effect.
+  // Least squares J (x, y) = d: the metric of the map, bounded away from zero at a pole, where x has no
+  // effect.
   const double smallest = 1e-9;
   const double a = std::max(glm::dot(j.dx, j.dx), smallest);
   const double b = glm::dot(j.dx, j.dy);
@@ -49,8 +50,8 @@ TexelDifferentials texel_differentials(const EnvMapLayout& layout, const MapPoin
   return {solve(ddx), solve(ddy)};
 }
 
-// A Gaussian of the squared radius that has fallen to e⁻² at the rim of the ellipse, r² = 1, and is cut there, from a
-// table: within 8e-6, as Heckbert 1989 has it.
+// A Gaussian of the squared radius that has fallen to e⁻² at the rim of the ellipse, r² = 1, and is cut
+// there, from a table: within 8e-6, as Heckbert 1989 has it.
 double ellipse_weight(double r2) {
   constexpr double kFalloff = 2.0;
   constexpr std::size_t kSteps = 256;
@@ -138,8 +139,8 @@ struct Sampler {
     });
   }
 
-  // The 1 that is added to the squares is the filter of the texels themselves, so that an ellipse smaller than a texel
-  // still interpolates; `widen` bounds the anisotropy.
+  // The 1 that is added to the squares is the filter of the texels themselves, so that an ellipse smaller
+  // than a texel still interpolates; `widen` bounds the anisotropy.
   void average_ellipse(const MapPoint& point, int level, const TexelDifferentials& d, double widen,
                        std::vector<double>& result) const {
     const double xx = d.dx.x * d.dx.x + d.dy.x * d.dy.x + 1.0 + widen;

@@ -65,8 +65,8 @@ std::uint32_t TexelTopology::texel_at(const TexelPlace& place) const {
   if (kind_ == TopologyKind::atlas) {
     return index({place.level, 0, std::clamp(place.row, 0, h - 1), std::clamp(place.column, 0, w - 1)});
   }
-  // The direction of the missing texel's centre, seen from the neighbouring face, is shifted along the edge by less
-  // than half a texel, so that it still falls into the texel across the edge.
+  // The direction of the missing texel's centre, seen from the neighbouring face, is shifted along the edge
+  // by less than half a texel, so that it still falls into the texel across the edge.
   const Projection projection = projection_of(kind_);
   const MapPoint point = point_from_direction(
       projection,

@@ -14,11 +14,13 @@ class Bytes {
  public:
   virtual ~Bytes() = default;
   virtual std::uint64_t size() const = 0;
-  /// Returns how many of the bytes from `offset` on there are, at most to.size(). From several threads at once.
+  /// Returns how many of the bytes from `offset` on there are, at most to.size(). From several threads at
+  /// once.
   virtual std::size_t read(std::uint64_t offset, std::span<unsigned char> to) const = 0;
 };
 
-/// A regular file: folders, devices and pipes are refused, without waiting for a pipe's writer. Throws FileError.
+/// A regular file: folders, devices and pipes are refused, without waiting for a pipe's writer. Throws
+/// FileError.
 std::unique_ptr<const Bytes> open_bytes(const std::string& path);
 
 /// Memory, which has to outlive the result.

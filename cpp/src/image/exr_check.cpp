@@ -9,8 +9,8 @@
 namespace mirrorbake::image_files {
 namespace {
 
-// "OpenEXR File Layout": magic number and version; headers of attributes, each a name, the name of its type, its size and
-// its value; an empty name ends a header, an empty header those of several parts.
+// "OpenEXR File Layout": magic number and version; headers of attributes, each a name, the name of its type,
+// its size and its value; an empty name ends a header, an empty header those of several parts.
 constexpr std::uint64_t kHeadersAt = 8;
 constexpr unsigned char kMultiPart = 0x10;  // in the second byte of the version
 constexpr std::size_t kLongestName = 255;

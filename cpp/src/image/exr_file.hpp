@@ -9,17 +9,18 @@
 
 namespace mirrorbake::image_files {
 
-/// Opens a part of an EXR file, with its integer channels (ids) as they are and its colours relative to Rec. 709. Channels in
-/// no layer come before those of layers; V-Ray's ".R" is "R". Throws FileError for anything but flat pixels with a value of
-/// every channel for every pixel, or luminance with chroma of half the size.
+/// Opens a part of an EXR file, with its integer channels (ids) as they are and its colours relative to Rec.
+/// 709. Channels in no layer come before those of layers; V-Ray's ".R" is "R". Throws FileError for anything
+/// but flat pixels with a value of every channel for every pixel, or luminance with chroma of half the size.
 std::unique_ptr<Reader> open_exr(const std::string& name, std::shared_ptr<const Bytes> bytes,
                                  const ImageChoice& choice);
 
-/// Walks the headers and throws FileError if an attribute is longer than the file, before OpenEXR makes room for it.
+/// Walks the headers and throws FileError if an attribute is longer than the file, before OpenEXR makes room
+/// for it.
 void check_exr(const std::string& name, const Bytes& bytes);
 
-/// Writes pixels of height × width × channels.size() to `file`, as scan lines in ZIP blocks; errors name `path`. Halves are
-/// clamped to ±65504; returns how many were. Throws FileError.
+/// Writes pixels of height × width × channels.size() to `file`, as scan lines in ZIP blocks; errors name
+/// `path`. Halves are clamped to ±65504; returns how many were. Throws FileError.
 std::uint64_t write_exr(const std::string& path, const std::string& file, int width, int height,
                         std::span<const std::string> channels, std::span<const float> pixels, bool as_half);
 

@@ -77,8 +77,8 @@ std::pair<std::string_view, std::string_view> layer_and_suffix(std::string_view 
   return {channel.substr(0, dot + 1), channel.substr(dot + 1)};
 }
 
-// Files store their channels in the order of the alphabet. As in OpenImageIO, colours come first within a layer and alpha
-// after them; an X with a Y or a Z makes coordinates.
+// Files store their channels in the order of the alphabet. As in OpenImageIO, colours come first within a
+// layer and alpha after them; an X with a Y or a Z makes coordinates.
 std::vector<std::string> in_usual_order(const std::vector<std::string>& names) {
   constexpr std::array<std::string_view, 20> kUsual = {"R",    "Red",  "G",  "Green", "B",     "Blue", "Y",
                                                        "real", "imag", "A",  "Alpha", "AR",    "RA",   "AG",
@@ -114,8 +114,9 @@ std::vector<std::string> in_usual_order(const std::vector<std::string>& names) {
   return sorted;
 }
 
-// Bytes of pixels from one byte of the file: deflate gives at most 1032, and 4 for 3 in PXR24; PIZ a run of 256 words for
-// ten bits; DWA 8 × 8 floats for two deflated bytes of their mean and two that end the block. 0 for what comes after them.
+// Bytes of pixels from one byte of the file: deflate gives at most 1032, and 4 for 3 in PXR24; PIZ a run of
+// 256 words for ten bits; DWA 8 × 8 floats for two deflated bytes of their mean and two that end the block. 0
+// for what comes after them.
 std::uint64_t most_expansion(Imf::Compression compression) {
   switch (compression) {
     case Imf::NO_COMPRESSION:
@@ -165,7 +166,8 @@ std::string part_name(const Imf::Header& part, int number) {
   return part.hasName() ? valid_utf8(part.name()) : std::to_string(number);
 }
 
-// The part that is asked for by name or number, or else the first with colours: depth is often a part of its own.
+// The part that is asked for by name or number, or else the first with colours: depth is often a part of its
+// own.
 int chosen_part(const std::string& name, const Imf::MultiPartInputFile& file, const std::string& wanted) {
   std::string known;
   for (int i = 0; i < file.parts(); ++i) {
@@ -185,7 +187,8 @@ struct Channel {
   std::string stored;
 };
 
-// Those of the layer that is asked for, without its name, or all. V-Ray names those in no layer ".R" and so on.
+// Those of the layer that is asked for, without its name, or all. V-Ray names those in no layer ".R" and so
+// on.
 std::vector<Channel> chosen_channels(const std::string& name, const std::vector<std::string>& stored,
                                      const std::string& layer) {
   std::vector<Channel> result;

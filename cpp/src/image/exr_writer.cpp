@@ -72,7 +72,8 @@ std::uint64_t write_exr(const std::string& path, const std::string& file, int wi
       out.writePixels(rows);
     }
   }
-  // OpenEXR says nothing of what fails when it is done: the table of its blocks and what is still in a buffer.
+  // OpenEXR says nothing of what fails when it is done: the table of its blocks and what is still in a
+  // buffer.
   stream.close();
   if (!stream) throw FileError(path, "cannot be written");
   return clamped;

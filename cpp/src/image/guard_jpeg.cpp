@@ -8,8 +8,8 @@
 namespace mirrorbake::image_files {
 namespace {
 
-// A decoder makes up what a truncated file lacks and carries on. Every complete file ends with an end-of-image marker,
-// possibly followed by a few bytes that programs append.
+// A decoder makes up what a truncated file lacks and carries on. Every complete file ends with an
+// end-of-image marker, possibly followed by a few bytes that programs append.
 bool is_complete(const Bytes& bytes) {
   constexpr std::uint64_t kTail = 4096;
   constexpr std::array<unsigned char, 2> kEnd = {0xff, 0xd9};

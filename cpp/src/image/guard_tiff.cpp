@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::uint64_t kTooLong = std::numeric_limits<std::uint64_t>::max();
 
-// Tags that decoding takes (TIFF 6.0, and the supplements for floats and JPEG), and those of MIP-mapped textures. What is
-// not here is metadata: XMP, IPTC, EXIF, Photoshop's, ICC profiles.
+// Tags that decoding takes (TIFF 6.0, and the supplements for floats and JPEG), and those of MIP-mapped
+// textures. What is not here is metadata: XMP, IPTC, EXIF, Photoshop's, ICC profiles.
 constexpr std::array<std::uint16_t, 43> kWanted = {254, 255, 256, 257, 258, 259, 262, 263, 264, 265,  266,
                                                    273, 277, 278, 279, 280, 281, 284, 292, 293, 301,  317,
                                                    318, 319, 320, 322, 323, 324, 325, 332, 333, 334,  336,

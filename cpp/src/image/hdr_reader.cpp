@@ -222,8 +222,8 @@ class HdrReader : public Reader {
     }
   }
 
-  // A mantissa stands for the middle of its interval in Radiance's own programs; here, as in all other readers, for its
-  // lower end, so that 1 is 1.
+  // A mantissa stands for the middle of its interval in Radiance's own programs; here, as in all other
+  // readers, for its lower end, so that 1 is 1.
   static glm::dvec3 decode(const Pixel& pixel) {
     if (pixel[3] == 0) return glm::dvec3(0.0);
     const double scale = std::ldexp(1.0, static_cast<int>(pixel[3]) - 136);

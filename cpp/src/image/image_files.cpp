@@ -10,7 +10,8 @@
 
 namespace mirrorbake::image_files {
 
-// Only these readers ever see a file: OpenImageIO left to itself tries all of its plugins on one it does not recognise.
+// Only these readers ever see a file: OpenImageIO left to itself tries all of its plugins on one it does not
+// recognise.
 FileKind kind_of(const std::string& name, const Bytes& bytes) {
   std::array<unsigned char, 12> head{};
   const std::size_t size = bytes.read(0, head);

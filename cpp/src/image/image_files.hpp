@@ -13,8 +13,8 @@
 #include "guard.hpp"
 #include "mirrorbake/image/image_io.hpp"
 
-/// What the readers of image files share: OpenEXR's, which is part of this library, and OpenImageIO's in a library that
-/// is loaded when it is needed. Nothing here knows either.
+/// What the readers of image files share: OpenEXR's, which is part of this library, and OpenImageIO's in a
+/// library that is loaded when it is needed. Nothing here knows either.
 namespace mirrorbake::image_files {
 
 enum class FileKind { exr, hdr, tiff, png, jpeg, webp };
@@ -25,7 +25,8 @@ FileKind kind_of(const std::string& name, const Bytes& bytes);
 std::optional<FileKind> known_extension(const std::string& path);
 FileKind kind_from_extension(const std::string& path);
 
-/// Finds what only looks like a whole file, and what a decoder must not see, before a decoder sees it. Throws FileError.
+/// Finds what only looks like a whole file, and what a decoder must not see, before a decoder sees it. Throws
+/// FileError.
 Guard guard_of(const std::string& name, FileKind kind, const Bytes& bytes);
 
 /// Columns [x, x + width) and rows [y, y + height) of the plane that a file's pixels lie in.

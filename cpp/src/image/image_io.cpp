@@ -125,8 +125,8 @@ std::unique_ptr<Reader> open(const std::string& name, std::shared_ptr<const imag
   return reader;
 }
 
-// TIFF 6.0, Orientation: 2 is mirrored left to right, 3 turned by 180 degrees, 4 mirrored top to bottom; 5 to 8 are those
-// with rows and columns exchanged first.
+// TIFF 6.0, Orientation: 2 is mirrored left to right, 3 turned by 180 degrees, 4 mirrored top to bottom; 5 to
+// 8 are those with rows and columns exchanged first.
 Image upright(Image image, int orientation) {
   if (orientation == 1) return image;
   const bool is_exchanged = orientation >= 5;

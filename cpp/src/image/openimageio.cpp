@@ -8,8 +8,8 @@ namespace mirrorbake::image_files {
 namespace {
 
 const OpenImageIo& load() {
-  // Found by the run path of the program or extension module that this code is part of. Never unloaded: its thread pools
-  // and caches last as long as the process.
+  // Found by the run path of the program or extension module that this code is part of. Never unloaded: its
+  // thread pools and caches last as long as the process.
   void* const library = dlopen(MIRRORBAKE_OPENIMAGEIO_LIBRARY, RTLD_NOW | RTLD_LOCAL);
   void* const entry = library == nullptr ? nullptr : dlsym(library, MIRRORBAKE_OPENIMAGEIO_ENTRY);
   if (entry == nullptr) {

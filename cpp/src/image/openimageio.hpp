@@ -11,8 +11,9 @@
 #include "image_files.hpp"
 #include "mirrorbake/image/texture_file.hpp"
 
-/// OpenImageIO behind an interface, in a library of its own that is loaded when one of these is needed first: with what it
-/// depends on it takes a third of a second and 260 libraries to load, which EXR files do without.
+/// OpenImageIO behind an interface, in a library of its own that is loaded when one of these is needed first:
+/// with what it depends on it takes a third of a second and 260 libraries to load, which EXR files do
+/// without.
 namespace mirrorbake::image_files {
 
 /// What save_image was asked for, checked.
@@ -37,8 +38,9 @@ class Texture {
   virtual glm::vec3 lookup(glm::vec2 uv, float footprint, TextureWrap wrap_u, TextureWrap wrap_v) const = 0;
 };
 
-/// All of them throw FileError. Objects of these types and exceptions cross from one library to the other: both have to be
-/// built by one compiler, which the name of the entry point cannot say but the version in it can.
+/// All of them throw FileError. Objects of these types and exceptions cross from one library to the other:
+/// both have to be built by one compiler, which the name of the entry point cannot say but the version in it
+/// can.
 class OpenImageIo {
  public:
   virtual ~OpenImageIo() = default;

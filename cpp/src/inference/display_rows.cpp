@@ -8,8 +8,8 @@
 namespace mirrorbake {
 namespace {
 
-// The lookups of every pixel that traced samples see, too: [begin, end) of the view's lookups, which are in the order of
-// pixels.
+// The lookups of every pixel that traced samples see, too: [begin, end) of the view's lookups, which are in
+// the order of pixels.
 struct PixelLookups {
   std::uint32_t pixel;
   std::size_t begin, end;

@@ -13,13 +13,13 @@ namespace {
 
 constexpr std::size_t kRowGrain = 2048;
 
-// Rounds of the active set, and the share of all iterations that one may take, so that the bounds are met even where
-// the first round does not converge.
+// Rounds of the active set, and the share of all iterations that one may take, so that the bounds are met
+// even where the first round does not converge.
 constexpr int kMaxRounds = 8;
 constexpr int kRoundShare = 3;
 
-// Conjugate gradients in float come to rest at rounding: a round ends when the gradient has not become smaller for as
-// many iterations.
+// Conjugate gradients in float come to rest at rounding: a round ends when the gradient has not become
+// smaller for as many iterations.
 constexpr int kPatience = 40;
 
 Channels to_channels(const ChannelSums& sums) {
@@ -28,8 +28,9 @@ Channels to_channels(const ChannelSums& sums) {
   return c;
 }
 
-// Puts what is out of bounds on its bound and holds it there; frees what is held and wants inside, going by half the negative
-// gradient s. Returns whether there was anything to hold or free: only then another round can change the solution.
+// Puts what is out of bounds on its bound and holds it there; frees what is held and wants inside, going by
+// half the negative gradient s. Returns whether there was anything to hold or free: only then another round
+// can change the solution.
 bool hold_to(const Bounds& bounds, const Vector& s, Vector& x, Vector& free) {
   std::atomic<bool> changed = false;
   parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
@@ -191,14 +192,15 @@ ChannelSums LeastSquares::preconditioned_gradient(float magnitude, const Vector&
   });
 }
 
-// CGLS (Björck, Numerical Methods for Least Squares Problems, 1996, §7.4): the residual t = b − A x is carried along
-// instead of AᵀA's, so that rounding grows with the condition number of A, not its square. G x of the regulariser is
-// carried along likewise. All channels step together, each with its own step lengths.
+// CGLS (Björck, Numerical Methods for Least Squares Problems, 1996, §7.4): the residual t = b − A x is
+// carried along instead of AᵀA's, so that rounding grows with the condition number of A, not its square. G x
+// of the regulariser is carried along likewise. All channels step together, each with its own step lengths.
 //
-// The bounds are an active set around it (op. cit., §5.2): texels that a round of conjugate gradients drives out of
-// bounds are put on their bound and held there, held ones that the gradient pulls inside are set free, and the next round
-// goes on from there. Clamping the unbounded solution instead would be far from the best map: where the data leave a
-// combination of texels undetermined, large positive and negative ones cancel each other.
+// The bounds are an active set around it (op. cit., §5.2): texels that a round of conjugate gradients drives
+// out of bounds are put on their bound and held there, held ones that the gradient pulls inside are set free,
+// and the next round goes on from there. Clamping the unbounded solution instead would be far from the best
+// map: where the data leave a combination of texels undetermined, large positive and negative ones cancel
+// each other.
 SolveReport LeastSquares::minimise(const std::vector<Vector>& target, float magnitude, const Bounds& bounds,
                                    Vector& x) {
   const std::size_t n = state_.unknowns();

@@ -12,7 +12,8 @@ namespace mirrorbake {
 
 using Vector = std::vector<Channels>;
 
-/// A view's matrix transposed, its columns numbered to the texels that the view sees, so that both products gather.
+/// A view's matrix transposed, its columns numbered to the texels that the view sees, so that both products
+/// gather.
 struct View {
   const RenderingMatrix* matrix;
   std::vector<NodeWeight> nodes;
@@ -58,7 +59,8 @@ class LeastSquares {
   /// Σ w |t|² per channel.
   ChannelSums weighted_squares(const std::vector<Vector>& t) const;
 
-  /// Minimises Σ w |A x − target|² + scale · (regulariser + magnitude |x|²) within the bounds, starting from x.
+  /// Minimises Σ w |A x − target|² + scale · (regulariser + magnitude |x|²) within the bounds, starting from
+  /// x.
   SolveReport minimise(const std::vector<Vector>& target, float magnitude, const Bounds& bounds, Vector& x);
 
  private:

@@ -14,8 +14,9 @@ enum class FillTowards {
   zero,        ///< away from the known ones towards zero: for differences from a prior
 };
 
-/// Sets the texels of a map that are not `known` from those that are: pull up the pyramid, push down bilinearly from the
-/// coarser level, smooth what was pushed (after Gortler et al., The Lumigraph, SIGGRAPH 1996, §3.4).
+/// Sets the texels of a map that are not `known` from those that are: pull up the pyramid, push down
+/// bilinearly from the coarser level, smooth what was pushed (after Gortler et al., The Lumigraph, SIGGRAPH
+/// 1996, §3.4).
 void fill_unknown(const TexelTopology& topology, std::span<const std::uint8_t> known, FillTowards towards,
                   std::span<Channels> texels);
 

@@ -10,17 +10,17 @@
 
 namespace mirrorbake {
 
-/// The quadratic form λ_s Σ (x_i − x_j)² + λ_a Σ ω_q (x_q − mean of its children)² over numbered texels: i and j neighbours
-/// on one level, q a texel with children, ω_q a quarter of its numbered children. Terms that would involve texels without
-/// a number are left out.
+/// The quadratic form λ_s Σ (x_i − x_j)² + λ_a Σ ω_q (x_q − mean of its children)² over numbered texels: i
+/// and j neighbours on one level, q a texel with children, ω_q a quarter of its numbered children. Terms that
+/// would involve texels without a number are left out.
 class Regulariser {
  public:
   struct Weights {
     float smoothness, level_agreement;
   };
 
-  /// `number_of`: the number of every texel of all maps, in their order, that of all nodes one after the other; kNoTexel
-  /// for those without.
+  /// `number_of`: the number of every texel of all maps, in their order, that of all nodes one after the
+  /// other; kNoTexel for those without.
   Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
               std::size_t numbers, Weights weights);
 

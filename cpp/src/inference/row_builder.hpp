@@ -10,8 +10,8 @@
 
 namespace mirrorbake {
 
-/// One row of a matrix under construction: adds up the weights of equal texels. The footprints of a pixel's lookups overlap
-/// almost everywhere, so that a hash table of what is there beats sorting what comes.
+/// One row of a matrix under construction: adds up the weights of equal texels. The footprints of a pixel's
+/// lookups overlap almost everywhere, so that a hash table of what is there beats sorting what comes.
 class RowAccumulator {
  public:
   /// Empties the row.
@@ -30,8 +30,8 @@ class RowAccumulator {
   int shift_ = 32;
 };
 
-/// Fills in offsets, texels and weights of `matrix`, whose rows `fill_row(row, accumulator)` makes, in parallel: every chunk of
-/// rows is built on its own, then all are put one behind the other.
+/// Fills in offsets, texels and weights of `matrix`, whose rows `fill_row(row, accumulator)` makes, in
+/// parallel: every chunk of rows is built on its own, then all are put one behind the other.
 template <typename FillRow>
 void build_rows(RenderingMatrix& matrix, std::size_t rows, const FillRow& fill_row) {
   constexpr std::size_t kRowsPerChunk = 256;

@@ -65,8 +65,8 @@ void validate(const Harmonics& h) {
                basis_size(h.order) * static_cast<std::size_t>(h.channels), "(order + 1)² × channels");
 }
 
-// The associated Legendre functions divided by sin^m θ are polynomials of z, and sin^m θ cos mφ, sin^m θ sin mφ those of x
-// and y: Sloan, "Efficient Spherical Harmonic Evaluation", JCGT 2013.
+// The associated Legendre functions divided by sin^m θ are polynomials of z, and sin^m θ cos mφ, sin^m θ sin
+// mφ those of x and y: Sloan, "Efficient Spherical Harmonic Evaluation", JCGT 2013.
 void harmonic_basis(const glm::dvec3& d, int order, std::span<double> values) {
   check_range("order", order, 0, Harmonics::kLargestOrder);
   double cosine = 1.0;  // sin^m θ cos mφ

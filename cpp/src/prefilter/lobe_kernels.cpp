@@ -15,8 +15,8 @@ inline float log2_of(float x) {
   return static_cast<float>(exponent) + 2.885390081777927F * series;
 }
 
-// Of x ≤ 0.5, relative error 2e-7; what is below −60 counts as −60, 1e-18, which is nothing beside the peak and keeps
-// products of it normal.
+// Of x ≤ 0.5, relative error 2e-7; what is below −60 counts as −60, 1e-18, which is nothing beside the peak
+// and keeps products of it normal.
 inline float exp2_of(float x) {
   const float y = x < -60.0F ? -60.0F : x;
   const std::int32_t whole = static_cast<std::int32_t>(y - 0.5F);

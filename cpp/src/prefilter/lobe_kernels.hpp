@@ -6,8 +6,9 @@
 /// The inner loops of convolution, one set per instruction set (mirrorbake_add_isa_sources).
 namespace mirrorbake {
 
-/// Light of a part of the sphere, in up to three channels, and in the fourth the solid angle itself: Σ w L over its
-/// texels, Σ w L (l − l₀) and Σ w L |l − l₀|², l₀ the unit vector to where most of the light comes from.
+/// Light of a part of the sphere, in up to three channels, and in the fourth the solid angle itself: Σ w L
+/// over its texels, Σ w L (l − l₀) and Σ w L |l − l₀|², l₀ the unit vector to where most of the light comes
+/// from.
 struct MomentNode {
   float direction[3];
   float bound;  ///< how far its texels may be from `direction`, as a chord; below 0: it has none

@@ -9,13 +9,13 @@
 namespace mirrorbake {
 namespace {
 
-// Nodes as wide as this share of the scale on which the lobe changes: with both moments that they carry, what is
-// left out is of the fourth order for light that is spread evenly, and 1e-4 of the peak at most for a sun.
+// Nodes as wide as this share of the scale on which the lobe changes: with both moments that they carry, what
+// is left out is of the fourth order for light that is spread evenly, and 1e-4 of the peak at most for a sun.
 constexpr double kShare = 0.35;
 constexpr double kPhongShare = 0.45;  // whose derivatives fall off as fast as the lobe
 constexpr double kWidest = 0.2;       // radians, of lobes that are as wide as a hemisphere
-// Weights are left out below this share of the lobe's integral: a sun of 1e5 times the surroundings, 6e-5 sr wide, adds
-// less than 3e-5 of what they add.
+// Weights are left out below this share of the lobe's integral: a sun of 1e5 times the surroundings, 6e-5 sr
+// wide, adds less than 3e-5 of what they add.
 constexpr double kNegligible = 4e-6;
 constexpr std::size_t kTableSteps = 8192;
 
@@ -44,7 +44,8 @@ void plan_table(const Lobe& lobe, LobePlan& plan) {
                 static_cast<float>(kTableSteps),
                 static_cast<int>(kTableSteps) - 1};
   plan.cut = 2.0 * std::sin(0.5 * lobe.table_angle * std::numbers::pi / 180.0);
-  // The lobe changes on the scale √(weight / |second derivative by γ|); where it is small, on that of its peak.
+  // The lobe changes on the scale √(weight / |second derivative by γ|); where it is small, on that of its
+  // peak.
   std::array<double, LobePlan::kSteps + 1> scale{};
   double first_moment = 0.0;
   double mass = 0.0;

@@ -22,8 +22,8 @@ class MomentGrid {
   int cells() const { return cells_; }
   const MomentNode* nodes() const { return nodes_.data(); }
 
-  /// Appends the nodes to look at for all directions within a chord `radius` of `center`, none of cells smaller than those
-  /// of a grid of `cells`.
+  /// Appends the nodes to look at for all directions within a chord `radius` of `center`, none of cells
+  /// smaller than those of a grid of `cells`.
   void find(const LobePlan& plan, int cells, const float* center, double radius,
             std::vector<std::uint32_t>& list) const;
 

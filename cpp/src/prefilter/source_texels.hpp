@@ -41,8 +41,9 @@ class SourceTexels {
 /// About how wide a texel is where it is widest, in radians.
 double texel_width(const EnvMapLayout& layout);
 
-/// Into how many parts along each side texels are to be cut so that sums over them, with weights of a Gaussian of
-/// this width, are integrals to 1e-5: none while σ is 0.8 of a texel (the first alias is 2 exp(−2π²σ²)).
+/// Into how many parts along each side texels are to be cut so that sums over them, with weights of a
+/// Gaussian of this width, are integrals to 1e-5: none while σ is 0.8 of a texel (the first alias is 2
+/// exp(−2π²σ²)).
 int parts_for_width(const EnvMapLayout& layout, double sigma);
 
 }  // namespace mirrorbake

@@ -8,8 +8,8 @@
 
 namespace mirrorbake {
 
-// ∫ D F V (n·l) dl with normals drawn in proportion to D (n·h), at the middles of equal cells: tan² θ_h = α² u/(1 − u).
-// The integrand is smooth and periodic in the azimuth, of which half is enough.
+// ∫ D F V (n·l) dl with normals drawn in proportion to D (n·h), at the middles of equal cells: tan² θ_h = α²
+// u/(1 − u). The integrand is smooth and periodic in the azimuth, of which half is enough.
 SplitSum split_sum(double cosine, double alpha) {
   check_above("cosine", cosine, 0.0, 1.0);
   check_above("alpha", alpha, 0.0, 1.0);

@@ -11,22 +11,24 @@
 #include "mirrorbake/envmap/envmap.hpp"
 #include "source_texels.hpp"
 
-/// The texels of a map in blocks of 4 × 4, those in blocks of 2 × 2 blocks, and so on, to find the texels about a
-/// direction or on both sides of a great circle.
+/// The texels of a map in blocks of 4 × 4, those in blocks of 2 × 2 blocks, and so on, to find the texels
+/// about a direction or on both sides of a great circle.
 namespace mirrorbake {
 
 class TexelBlocks {
  public:
   TexelBlocks(const EnvMapLayout& layout, const SourceTexels& texels);
 
-  /// Appends the numbers of all texels (faces, rows, columns) whose middle lies within a chord of the unit vector r.
+  /// Appends the numbers of all texels (faces, rows, columns) whose middle lies within a chord of the unit
+  /// vector r.
   void find_near(const glm::dvec3& r, double chord, std::vector<std::uint32_t>& found) const;
 
-  /// Σ Ω L l over the texels of every block, of up to three channels, and Σ Ω l in the fourth: for sum_cosines().
+  /// Σ Ω L l over the texels of every block, of up to three channels, and Σ Ω l in the fourth: for
+  /// sum_cosines().
   void make_moments(const EnvMapView& map, int first_channel, const SourceTexels& texels);
 
-  /// Σ Ω L max(0, r·l) over all texels, and Σ Ω max(0, r·l) in the fourth place. Of blocks before the great circle
-  /// about r only the first moment counts, those behind it do not; along it every texel is looked at.
+  /// Σ Ω L max(0, r·l) over all texels, and Σ Ω max(0, r·l) in the fourth place. Of blocks before the great
+  /// circle about r only the first moment counts, those behind it do not; along it every texel is looked at.
   std::array<double, 4> sum_cosines(const glm::dvec3& r) const;
 
   const glm::vec3& direction(std::size_t texel) const { return directions_[texel]; }

@@ -9,8 +9,8 @@
 namespace mirrorbake {
 namespace {
 
-// OpenGL 4.6 core profile, table 8.19: on each face the axis that the direction follows, and those along which s
-// and t grow.
+// OpenGL 4.6 core profile, table 8.19: on each face the axis that the direction follows, and those along
+// which s and t grow.
 struct FaceFrame {
   glm::vec3 major, s_axis, t_axis;
 };
@@ -74,10 +74,11 @@ double cube_texel_solid_angle(int size, int column, int row) {
   const double y0 = row * step - 1.0;
   const double x1 = x0 + step;
   const double y1 = y0 + step;
-  // Ω = A(x1,y1) − A(x0,y1) − A(x1,y0) + A(x0,y0), A(x,y) = atan(xy/√(x²+y²+1)), cancels as the texel shrinks. Instead
-  // integrate the density (1+x²+y²)^(−3/2) exactly in x, ∂A/∂y = x / ((1+y²) √(1+x²+y²)), whose difference between x1 and
-  // x0 is taken without cancellation, and in y by Gauss-Legendre with five nodes, which for a texel is
-  // exact to rounding once size ≥ 32; coarser texels use the corners, which do not cancel.
+  // Ω = A(x1,y1) − A(x0,y1) − A(x1,y0) + A(x0,y0), A(x,y) = atan(xy/√(x²+y²+1)), cancels as the texel
+  // shrinks. Instead integrate the density (1+x²+y²)^(−3/2) exactly in x, ∂A/∂y = x / ((1+y²) √(1+x²+y²)),
+  // whose difference between x1 and x0 is taken without cancellation, and in y by Gauss-Legendre with five
+  // nodes, which for a texel is exact to rounding once size ≥ 32; coarser texels use the corners, which do
+  // not cancel.
   if (size < 32) {
     const auto corner = [](double x, double y) { return std::atan2(x * y, std::sqrt(x * x + y * y + 1.0)); };
     return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0);

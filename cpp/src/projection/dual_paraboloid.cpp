@@ -34,8 +34,8 @@ MapJacobian dual_paraboloid_jacobian(int face, double x, double y) {
 glm::mat4 dual_paraboloid_texture_matrix(const glm::mat3& frame_from_map, int face) {
   check_range("face", face, 0, 1);
   check_orthonormal("frame_from_map", frame_from_map);
-  // s = ½ + ½ r_x/q and t = ½ − ½ r_y/q with q = 1 ± r_z, in the order A · P · S · M⁻¹ of [EMT]; GLM's matrices
-  // are lists of columns.
+  // s = ½ + ½ r_x/q and t = ½ − ½ r_y/q with q = 1 ± r_z, in the order A · P · S · M⁻¹ of [EMT]; GLM's
+  // matrices are lists of columns.
   const float sign = face == 0 ? 1.0F : -1.0F;
   const glm::mat4 subtract(glm::vec4(1, 0, 0, 0), glm::vec4(0, 1, 0, 0), glm::vec4(0, 0, sign, 0),
                            glm::vec4(0, 0, 1, 1));

@@ -34,8 +34,8 @@ double integrate_rectangle(const Rectangle& r, F&& f) {
   });
 }
 
-/// ∫∫ density(x² + y²) over the rectangle within the unit disc. The density must be smooth on a scale of 1; then the
-/// error is that of rounding, since rectangles larger than 1/16 are halved first.
+/// ∫∫ density(x² + y²) over the rectangle within the unit disc. The density must be smooth on a scale of 1;
+/// then the error is that of rounding, since rectangles larger than 1/16 are halved first.
 template <typename Density>
 double integrate_in_disc(Rectangle r, Density&& density) {
   constexpr double kLargest = 1.0 / 16.0;
@@ -63,8 +63,9 @@ double integrate_in_disc(Rectangle r, Density&& density) {
   }
   const auto value = [&](double x, double y) { return density(x * x + y * y); };
   if (r.x1 * r.x1 + r.y1 * r.y1 <= 1.0) return integrate_rectangle(r, value);
-  // The rim crosses the rectangle. With the smaller coordinate as x it is a graph y(x) of slope below about 1, full
-  // height left of where it leaves through the top, empty right of where it leaves through the bottom.
+  // The rim crosses the rectangle. With the smaller coordinate as x it is a graph y(x) of slope below about
+  // 1, full height left of where it leaves through the top, empty right of where it leaves through the
+  // bottom.
   if (r.x0 + r.x1 > r.y0 + r.y1) r = {r.y0, r.y1, r.x0, r.x1};
   const auto rim = [](double t) { return std::sqrt(std::max(0.0, (1.0 - t) * (1.0 + t))); };
   const double full_end = std::clamp(rim(r.y1), r.x0, r.x1);

@@ -26,7 +26,8 @@ using Parameters = Eigen::VectorXd;
 
 enum class Shape { infinite, sphere, hemisphere, box, ellipsoid };
 
-/// A family of shapes. Its parameters are, with lengths in units of the scene's scale and seen from the origin:
+/// A family of shapes. Its parameters are, with lengths in units of the scene's scale and seen from the
+/// origin:
 ///
 ///   sphere      centre x y z, log radius
 ///   hemisphere  centre x z, log depth of the floor, log radius
@@ -146,7 +147,8 @@ struct Fit {
   double cost = std::numeric_limits<double>::infinity();
 };
 
-/// Below this chord the loss is quadratic, above linear (Huber): well below what one sees, well above rounding.
+/// Below this chord the loss is quadratic, above linear (Huber): well below what one sees, well above
+/// rounding.
 constexpr double kHuberChord = 1e-3;
 
 /// Minimises Σ huber(|lookup − target|), chords between unit vectors.
@@ -370,8 +372,8 @@ std::string explain(const ProxyChoice& choice, std::size_t best, const ProxyChoi
   return text + (simpler.empty() ? "." : "; simpler ones are worse: " + simpler + ".");
 }
 
-/// What the shapes are fitted to: an even selection of each view's rays, in folds of which each is predicted from the
-/// others.
+/// What the shapes are fitted to: an even selection of each view's rays, in folds of which each is predicted
+/// from the others.
 struct Selection {
   Problem rays;
   std::vector<std::size_t> fold;  ///< of each ray
@@ -421,8 +423,8 @@ Selection select(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOpti
 
 constexpr int kMaxSteps = 60;
 
-// A few steps from each start show which leads where; the best one is followed to the end. The cost is infinite if no
-// start has the origin inside.
+// A few steps from each start show which leads where; the best one is followed to the end. The cost is
+// infinite if no start has the origin inside.
 Fit best_fit(const Family& family, const Selection& selection) {
   constexpr int kFirstSteps = 10;
   const std::vector<Parameters> candidates = starts(family, selection.rays, selection.hits);
@@ -439,8 +441,8 @@ Fit best_fit(const Family& family, const Selection& selection) {
   return std::isfinite(best.cost) ? fit_shape(family, selection.rays, best.parameters, kMaxSteps) : best;
 }
 
-// Mean angle by which a fit to the other folds misses. Each starts from the fit to everything: what is left to predict
-// is the shape, not which local minimum the search finds.
+// Mean angle by which a fit to the other folds misses. Each starts from the fit to everything: what is left
+// to predict is the shape, not which local minimum the search finds.
 double off_view_error(const Family& family, const Selection& selection, const Parameters& start) {
   const Problem& all = selection.rays;
   std::vector<double> sums(selection.folds, 0.0);

@@ -28,7 +28,7 @@ float round_up(double value) {
              : rounded;
 }
 
-// ---------------------------------------------------------------------------------------------------------------------
+// -----------------------------------------------------------------------------------------------------------
 // Minimum-volume ellipsoid. With w_i = 1/r_i² and X_j = (d_jx², d_jy², d_jz²), d_j the j-th point seen from
 // the centre,
 //
@@ -104,7 +104,7 @@ glm::dvec3 solve_constraints(std::span<const glm::dvec3> constraints, glm::dvec3
   return barrier_centre(constraints, 1e-11 / static_cast<double>(constraints.size()), w);
 }
 
-// ---------------------------------------------------------------------------------------------------------------------
+// -----------------------------------------------------------------------------------------------------------
 // Boxes. Sides are numbered −x, +x, −y, +y, −z, +z.
 
 using Sides = std::array<double, 6>;  ///< distance of each side from the origin, > 0

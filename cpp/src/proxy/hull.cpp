@@ -13,8 +13,8 @@
 namespace mirrorbake {
 namespace {
 
-/// Points in a tree of boxes, halved along their longest side, to ask whether any lies in front of a plane: of most
-/// planes the boxes of a few nodes tell.
+/// Points in a tree of boxes, halved along their longest side, to ask whether any lies in front of a plane:
+/// of most planes the boxes of a few nodes tell.
 class PointTree {
  public:
   explicit PointTree(std::span<const glm::vec3> points) : points_(points.begin(), points.end()) {

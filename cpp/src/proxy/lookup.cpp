@@ -98,8 +98,8 @@ void check_row(std::string_view name, std::span<const Vector> vectors, std::size
 /// Rays per task: some 50 µs.
 constexpr std::size_t kGrain = 16384;
 
-/// Runs `kernel(positions, seconds, lookups, count)`, which says how many it is done with, on all rays; there are
-/// `proxy_count` lookups for each.
+/// Runs `kernel(positions, seconds, lookups, count)`, which says how many it is done with, on all rays; there
+/// are `proxy_count` lookups for each.
 template <typename Vector, typename Kernel>
 void map_rays(std::span<const Vector> positions, std::string_view second_name,
               std::span<const Vector> seconds, std::span<Vector> lookups, std::size_t proxy_count,

@@ -1,8 +1,8 @@
 #pragma once
 
 /// Where rays leave the shapes: one formula each, without branches, that holds inside and outside (proxy.hpp
-/// documents what it means outside). Written once, in double, and compiled once per instruction set: everything lives
-/// in the namespace MIRRORBAKE_ISA and has internal linkage, and no other header is used.
+/// documents what it means outside). Written once, in double, and compiled once per instruction set:
+/// everything lives in the namespace MIRRORBAKE_ISA and has internal linkage, and no other header is used.
 #ifndef MIRRORBAKE_ISA
 #define MIRRORBAKE_ISA baseline
 #endif
@@ -53,9 +53,9 @@ inline double box_exit(const Vec& p, const Vec& d, const Vec& extent) {
   return t < kInfinity ? t : 0;
 }
 
-/// Unit sphere. |p + t·d|² = 1 has the larger root t = (−b + s)/a = −c/(b + s), s = √(b² − ac), of which the form is
-/// taken that does not cancel. A negative discriminant is a miss: with s = 0 the root is the nearest point; a negative
-/// root is behind: 0.
+/// Unit sphere. |p + t·d|² = 1 has the larger root t = (−b + s)/a = −c/(b + s), s = √(b² − ac), of which the
+/// form is taken that does not cancel. A negative discriminant is a miss: with s = 0 the root is the nearest
+/// point; a negative root is behind: 0.
 inline double sphere_exit(const Vec& p, const Vec& d) {
   const double a = dot(d, d);
   const double b = dot(p, d);
@@ -74,9 +74,9 @@ inline double hemisphere_exit(const Vec& p, const Vec& d) {
   return d.y < 0 && floor < sphere ? floor : sphere;
 }
 
-/// Rotates and scales into the shape's own coordinates; boxes are not scaled. The aligned version leaves out products
-/// with zeros and ones, which changes no bit of the result but the sign of a zero, to which the formulas are
-/// indifferent.
+/// Rotates and scales into the shape's own coordinates; boxes are not scaled. The aligned version leaves out
+/// products with zeros and ones, which changes no bit of the result but the sign of a zero, to which the
+/// formulas are indifferent.
 template <LookupShape shape, bool rotated>
 inline Vec local_direction(const LookupConstants& k, const Vec& d) {
   if constexpr (rotated) {

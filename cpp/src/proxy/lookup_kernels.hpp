@@ -2,14 +2,14 @@
 
 #include <cstddef>
 
-/// The inner loops over rays, one set per instruction set. Pointers, since the files that are compiled for AVX may not
-/// use inline functions of the standard library or GLM (see mirrorbake_add_isa_sources).
+/// The inner loops over rays, one set per instruction set. Pointers, since the files that are compiled for
+/// AVX may not use inline functions of the standard library or GLM (see mirrorbake_add_isa_sources).
 namespace mirrorbake {
 
 enum class LookupShape { infinite, box, ellipsoid, hemisphere };
 
-/// A proxy as the loops want it: local = rows · (p − centre), where the rows of the 3×3 matrix are the proxy's axes,
-/// divided by the radii for curved shapes.
+/// A proxy as the loops want it: local = rows · (p − centre), where the rows of the 3×3 matrix are the
+/// proxy's axes, divided by the radii for curved shapes.
 struct LookupConstants {
   LookupShape shape = LookupShape::infinite;
   bool rotated = false;
@@ -19,9 +19,9 @@ struct LookupConstants {
   double origin[3] = {};
 };
 
-/// Arrays of xyz triples; `lookups` may be the same memory as an input, but for mirrors in several proxies, whose
-/// lookups begin `stride` triples after one another. The loops go through the rays in blocks, stop before the first
-/// block that holds a NaN or an infinite value, and return how many rays they are done with.
+/// Arrays of xyz triples; `lookups` may be the same memory as an input, but for mirrors in several proxies,
+/// whose lookups begin `stride` triples after one another. The loops go through the rays in blocks, stop
+/// before the first block that holds a NaN or an infinite value, and return how many rays they are done with.
 struct LookupKernels {
   std::size_t (*rays_f32)(const LookupConstants& k, const float* positions, const float* directions,
                           float* lookups, std::size_t count);

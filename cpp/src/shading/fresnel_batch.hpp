@@ -12,12 +12,13 @@
 /// What the functions of arrays share: checks, and chunks on several threads.
 namespace mirrorbake {
 
-// From here on the output is written past the caches: a store to memory that is in none of them reads it first. The
-// price is that whoever reads the result at once finds it in memory (docs/adr/0020 has the figures).
+// From here on the output is written past the caches: a store to memory that is in none of them reads it
+// first. The price is that whoever reads the result at once finds it in memory (docs/adr/0020 has the
+// figures).
 constexpr std::size_t kLargeBytes = std::size_t{1} << 22;
 
-// Elements per task: some microseconds of work, against about one to hand it out. Tasks that write past the caches end
-// with a wait until that is done, so they are longer.
+// Elements per task: some microseconds of work, against about one to hand it out. Tasks that write past the
+// caches end with a wait until that is done, so they are longer.
 constexpr std::size_t kFresnelGrain = std::size_t{1} << 14;
 constexpr std::size_t kLargeFresnelGrain = std::size_t{1} << 17;
 

@@ -14,8 +14,8 @@
 namespace mirrorbake::MIRRORBAKE_ISA {
 namespace {
 
-// The bits of floating-point numbers ≥ 0 are in the order of the numbers, and integers have a minimum and a maximum.
-// In comparisons of floats GCC follows c = 0 and c = 1 as separate paths through the whole formula.
+// The bits of floating-point numbers ≥ 0 are in the order of the numbers, and integers have a minimum and a
+// maximum. In comparisons of floats GCC follows c = 0 and c = 1 as separate paths through the whole formula.
 template <typename T, typename Bits>
 inline T clamp_cosine_bits(T c, Bits one, Bits infinity, Bits all_but_sign) {
   const Bits bits = __builtin_bit_cast(Bits, c);

@@ -20,10 +20,10 @@ constexpr std::size_t kVectorBytes = 32;
 constexpr std::size_t kVectorBytes = 16;
 #endif
 
-/// Whether to go through c and f from their ends. A load waits for an earlier store that has the same last 12 bits of
-/// the address (Intel 64 and IA-32 Architectures Optimization Reference Manual, "4-KByte memory aliasing"), and arrays
-/// that were allocated one after the other often differ by a little more than whole pages: then the stores to f run
-/// just ahead of the loads from c, unless both run backwards.
+/// Whether to go through c and f from their ends. A load waits for an earlier store that has the same last 12
+/// bits of the address (Intel 64 and IA-32 Architectures Optimization Reference Manual, "4-KByte memory
+/// aliasing"), and arrays that were allocated one after the other often differ by a little more than whole
+/// pages: then the stores to f run just ahead of the loads from c, unless both run backwards.
 inline bool runs_backwards(const void* c, const void* f) {
   constexpr __UINTPTR_TYPE__ kPage = 4096;
   const __UINTPTR_TYPE__ ahead =
@@ -31,9 +31,9 @@ inline bool runs_backwards(const void* c, const void* f) {
   return ahead > 0 && ahead < kPage / 2;
 }
 
-/// How far ahead of itself a loop asks for memory. For what it will write: a store to a line that is in no cache waits
-/// for it, and the processor fetches ahead for loads alone. For what it will read past the caches' size: the processor
-/// does not fetch ahead across pages.
+/// How far ahead of itself a loop asks for memory. For what it will write: a store to a line that is in no
+/// cache waits for it, and the processor fetches ahead for loads alone. For what it will read past the
+/// caches' size: the processor does not fetch ahead across pages.
 constexpr std::size_t kWriteAheadBytes = 2048;
 constexpr std::size_t kReadAheadBytes = 4096;
 

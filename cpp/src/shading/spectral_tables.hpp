@@ -13,8 +13,8 @@ constexpr OpticalConstants::Entry kAluminium[] = {
     {516.6, 0.8734, 6.2418},   {563.57, 1.0728, 6.7839},  {619.93, 1.366, 7.4052},  {652.25, 1.5724, 7.7354},
     {688.81, 1.8301, 8.0601},  {729.32, 2.1606, 8.3565},  {774.91, 2.6154, 8.4914}, {794.78, 2.7675, 8.3866}};
 
-// P. B. Johnson and R. W. Christy, "Optical constants of the noble metals", Physical Review B 6, 4370–4379 (1972).
-// Given at photon energies from 1.51 to 3.37 eV.
+// P. B. Johnson and R. W. Christy, "Optical constants of the noble metals", Physical Review B 6, 4370–4379
+// (1972). Given at photon energies from 1.51 to 3.37 eV.
 constexpr std::string_view kJohnsonChristy1972 = "Johnson and Christy, Phys. Rev. B 6, 4370 (1972)";
 constexpr OpticalConstants::Entry kSilver[] = {
     {367.9, 0.07, 1.657}, {381.5, 0.05, 1.864}, {397.4, 0.05, 2.07},  {413.3, 0.05, 2.275},
@@ -32,8 +32,8 @@ constexpr OpticalConstants::Entry kCopper[] = {
     {520.9, 1.18, 2.608}, {548.6, 1.02, 2.577}, {582.1, 0.7, 2.704},  {616.8, 0.3, 3.205},
     {659.5, 0.22, 3.747}, {704.5, 0.21, 4.205}, {756.0, 0.24, 4.665}, {821.1, 0.26, 5.18}};
 
-// P. B. Johnson and R. W. Christy, "Optical constants of transition metals: Ti, V, Cr, Mn, Fe, Co, Ni, and Pd",
-// Physical Review B 9, 5056–5070 (1974). The same energies.
+// P. B. Johnson and R. W. Christy, "Optical constants of transition metals: Ti, V, Cr, Mn, Fe, Co, Ni, and
+// Pd", Physical Review B 9, 5056–5070 (1974). The same energies.
 constexpr std::string_view kJohnsonChristy1974 = "Johnson and Christy, Phys. Rev. B 9, 5056 (1974)";
 constexpr OpticalConstants::Entry kChromium[] = {
     {368.0, 1.87, 2.69}, {381.0, 1.92, 2.74}, {397.0, 2.0, 2.83},  {413.0, 2.08, 2.93},

@@ -22,8 +22,8 @@ std::vector<glm::vec2> grid(int side) {
 }  // namespace
 
 RunTimeModel web_run_time() {
-  // The rotated grid: every row and every column of a 4 × 4 grid has one lookup, so that edges near to horizontal and
-  // vertical get four steps.
+  // The rotated grid: every row and every column of a 4 × 4 grid has one lookup, so that edges near to
+  // horizontal and vertical get four steps.
   return {.name = "Web",
           .places = {{0.375F, 0.125F}, {0.875F, 0.375F}, {0.125F, 0.625F}, {0.625F, 0.875F}},
           .footprint_scale = 0.5F};

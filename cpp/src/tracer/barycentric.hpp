@@ -8,7 +8,8 @@
 
 namespace mirrorbake::tracing {
 
-/// What vertices carry, between the corners of a triangle. `weights` are those of the second and third corner.
+/// What vertices carry, between the corners of a triangle. `weights` are those of the second and third
+/// corner.
 template <typename Values>
 auto interpolate(const Values& values, glm::uvec3 corner, glm::vec2 weights) {
   return (1.0F - weights.x - weights.y) * values[corner.x] + weights.x * values[corner.y] +

@@ -145,7 +145,8 @@ BeautyTrace Tracer::trace_beauty_to_noise(const Camera& camera, float noise,
   constexpr int kTileSize = 16;
   tracing::BeautySums sums(camera.width, tracing::window_in(options, camera.width, camera.height), kTileSize);
 
-  // Rounds over all tiles, so that which one ends depends neither on the number of threads nor on their order.
+  // Rounds over all tiles, so that which one ends depends neither on the number of threads nor on their
+  // order.
   std::vector<std::size_t> open(sums.tile_count());
   std::iota(open.begin(), open.end(), std::size_t{0});
   std::vector<double> relative(sums.tile_count(), 0.0);

@@ -28,8 +28,8 @@ constexpr float kNoticeable = 0.01F;
 // Fewer than this are not worth the look.
 constexpr float kFewestRays = 0.1F;
 
-// The octahedral map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT
-// 3(2), 2014) to [−1,1]², and its solid angle per area, |d|₁³ for a unit direction d.
+// The octahedral map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors",
+// JCGT 3(2), 2014) to [−1,1]², and its solid angle per area, |d|₁³ for a unit direction d.
 struct Octahedral {
   glm::vec2 point;
   float solid_angle;
@@ -61,8 +61,8 @@ int bin_of(glm::vec2 point) {
   return y * kSide + x;
 }
 
-// A bit for each of 8 × 8 squares of bins. Few are lit: a look at them mostly spares the look at the bins, which are in
-// no cache.
+// A bit for each of 8 × 8 squares of bins. Few are lit: a look at them mostly spares the look at the bins,
+// which are in no cache.
 std::uint64_t square_bit(int bin) {
   constexpr int kSquare = kSide / 8;
   static_assert(kSide % 8 == 0);

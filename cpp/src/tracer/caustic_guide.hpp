@@ -15,9 +15,10 @@ struct World;
 class SpecularTriangles;
 
 /// Where to look for caustics: from which directions light arrives at a place by way of specular surfaces. A
-/// diffuse path finds such light by chance alone, seldom and brightly; the guide tells where rays of their own should
-/// look (after Jensen, "Importance Driven Path Tracing using the Photon Map", EGWR 1995). It only chooses directions:
-/// what is found along them is weighted by their density, so that the guide need not be right.
+/// diffuse path finds such light by chance alone, seldom and brightly; the guide tells where rays of their
+/// own should look (after Jensen, "Importance Driven Path Tracing using the Photon Map", EGWR 1995). It only
+/// chooses directions: what is found along them is weighted by their density, so that the guide need not be
+/// right.
 ///
 /// A photon starts at a random point of the specular surfaces, lit by a random light, and follows their
 /// reflection to a diffuse surface. A grid of cells, each with a histogram of directions, holds what arrived.
@@ -35,7 +36,8 @@ class CausticGuide {
 
   /// What is known of one place.
   struct Cell {
-    /// Guided rays that are worth their while beside a path of weight 1, in [0,1); 0: there is nothing to find.
+    /// Guided rays that are worth their while beside a path of weight 1, in [0,1); 0: there is nothing to
+    /// find.
     float rays = 0.0F;
     std::uint32_t number = 0;       ///< among the cells with rays
     std::uint64_t lit_squares = 0;  ///< which of 8 × 8 squares of bins light arrives from

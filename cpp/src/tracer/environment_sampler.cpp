@@ -31,8 +31,8 @@ EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
   for (int y = 0; y <= height; ++y) row_cosine_.push_back(std::cos(std::numbers::pi * y / height));
   std::vector<float> means(w * static_cast<std::size_t>(height));
   for (int y = 0; y < height; ++y) {
-    // Mean of the bilinear interpolant over the texel: weights 1/8, 3/4, 1/8 each way. The density by luminance is
-    // positive wherever the radiance is.
+    // Mean of the bilinear interpolant over the texel: weights 1/8, 3/4, 1/8 each way. The density by
+    // luminance is positive wherever the radiance is.
     for (int x = 0; x < width; ++x) {
       double mean = 0.0;
       for (int j = -1; j <= 1; ++j) {

@@ -301,8 +301,8 @@ glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const
   glm::vec3 direction(0.0F);
   float pdf = 0.0F;             // 0 after a mirror: emission counts in full
   NextEvent how{effort, true};  // where the followed ray starts
-  // Since the last diffuse surface: what is known of caustics there, the specular surfaces passed, and the weight of
-  // the light that they show.
+  // Since the last diffuse surface: what is known of caustics there, the specular surfaces passed, and the
+  // weight of the light that they show.
   CausticGuide::Cell cell;
   int chain = 0;
   float chain_weight = 1.0F;
@@ -358,8 +358,8 @@ glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const
     } else {
       throughput *= surface.albedo / (1.0F - specular_probability);
     }
-    // Russian roulette. Paths are short-lived only once little is left: an early end saves less time than its noise
-    // costs.
+    // Russian roulette. Paths are short-lived only once little is left: an early end saves less time than its
+    // noise costs.
     constexpr float kLittle = 0.25F;
     const float left = brightest(throughput);
     if (!(left > 0.0F)) return sum;

@@ -261,8 +261,8 @@ void LayerTracer::trace() {
   });
 }
 
-// By what the eight pixels around it vary by, never by its own samples: so their mean stays unbiased, and nothing that was
-// traced is thrown away.
+// By what the eight pixels around it vary by, never by its own samples: so their mean stays unbiased, and
+// nothing that was traced is thrown away.
 int LayerTracer::wanted_samples(const Pixels& pixels, const PixelWindow& area, int x, int y) const {
   double largest = 0.0;
   for (const auto& of_reflector : pixels) {

@@ -101,7 +101,8 @@ std::optional<LightSample> sample_sphere(glm::vec3 centre, float radius, glm::ve
                       static_cast<float>(sine * std::sin(azimuth)), static_cast<float>(cosine)}));
   const double r = radius;
   const double half_chord = std::sqrt(std::max(0.0, r * r - distance * distance * sine2));
-  // The shadow ray ends a thousandth of the radius before the sphere: near the rim it hits early by some 1e-4.
+  // The shadow ray ends a thousandth of the radius before the sphere: near the rim it hits early by some
+  // 1e-4.
   const auto reach = static_cast<float>(std::max(0.0, distance * cosine - half_chord - 1e-3 * r));
   const auto pdf = static_cast<float>(1.0 / (2.0 * std::numbers::pi * cap));
   return LightSample{direction, reach, glm::vec3(1.0F / pdf), pdf};

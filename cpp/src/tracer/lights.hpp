@@ -23,8 +23,9 @@ struct LightSample {
       0.0F;  ///< density per solid angle of this direction; 0 if rays that are followed cannot find the light
 };
 
-/// How many directions next-event estimation takes at a surface. `one` picks a light by what it may bring there at most,
-/// shadows apart. `many` takes every light if they are few, some several times, else a few picks.
+/// How many directions next-event estimation takes at a surface. `one` picks a light by what it may bring
+/// there at most, shadows apart. `many` takes every light if they are few, some several times, else a few
+/// picks.
 enum class Effort { one, many };
 
 /// How next-event estimation was done at a surface: what a followed ray from there has to share with.
@@ -42,9 +43,10 @@ struct LightSamples {
 
 /// All lights of a scene.
 ///
-/// `shared` says of a surface that followed rays take every direction from which it reflects light. Then the even part of
-/// the sky is left to them, and samples go to what is brighter than the average (Karlík et al., "MIS Compensation:
-/// Optimizing Sampling Techniques in Multiple Importance Sampling", ACM TOG 38(6), 2019, §5).
+/// `shared` says of a surface that followed rays take every direction from which it reflects light. Then the
+/// even part of the sky is left to them, and samples go to what is brighter than the average (Karlík et al.,
+/// "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling", ACM TOG 38(6), 2019,
+/// §5).
 class Lights {
  public:
   Lights(const Scene& scene, const RayScene& rays);
@@ -58,8 +60,8 @@ class Lights {
   LightSamples sample_many(glm::vec3 position, const SampleStream& stream, std::uint32_t dimension,
                            bool shared) const;
 
-  /// What a ray finds where it leaves the scene, and the density with which its direction is taken at its origin: the
-  /// mean number of samples per solid angle, as all densities here.
+  /// What a ray finds where it leaves the scene, and the density with which its direction is taken at its
+  /// origin: the mean number of samples per solid angle, as all densities here.
   EnvironmentSampler::Found environment(const Ray& ray, NextEvent how) const;
 
   /// What a ray finds that hits light number `light`: the rectangles come first, then the spheres.

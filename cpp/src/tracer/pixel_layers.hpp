@@ -12,8 +12,8 @@
 
 namespace mirrorbake::tracing {
 
-/// The light that arrives along a direction of the specular lobe, split by what the ray hits first, with the distance along
-/// the direction to what each layer's ray hits.
+/// The light that arrives along a direction of the specular lobe, split by what the ray hits first, with the
+/// distance along the direction to what each layer's ray hits.
 struct SpecularLayers {
   glm::vec4 local{0.0F};
   glm::vec3 distant{0.0F};
@@ -26,8 +26,8 @@ struct SpecularLayers {
 /// Sums over the samples of a pixel for one reflector, then their means.
 class PixelLayers {
  public:
-  /// Samples are told apart by quarters of the `planned` ones: each quarter of a power of two is stratified by itself, so
-  /// that what the quarters differ by tells the error of their mean.
+  /// Samples are told apart by quarters of the `planned` ones: each quarter of a power of two is stratified
+  /// by itself, so that what the quarters differ by tells the error of their mean.
   void plan(int samples);
 
   /// The next sample sees the reflector, or something else.
@@ -38,8 +38,8 @@ class PixelLayers {
   int covered() const { return covered_; }
   int planned() const { return planned_; }
 
-  /// Squared standard error of the displayed value (sRGB, 0…1, mean of the channels) of the covered samples' mean; 0 where
-  /// fewer than two quarters see the reflector.
+  /// Squared standard error of the displayed value (sRGB, 0…1, mean of the channels) of the covered samples'
+  /// mean; 0 where fewer than two quarters see the reflector.
   double display_variance() const;
 
   /// Writes the channels of `layer_channels`.

@@ -20,8 +20,8 @@ struct PrimarySample {
   Hit hit;
 };
 
-/// A piece of an image row, and which of its pixels' samples are meant. A sample's random numbers depend on the
-/// place of its pixel in the whole image.
+/// A piece of an image row, and which of its pixels' samples are meant. A sample's random numbers depend on
+/// the place of its pixel in the whole image.
 struct RowSegment {
   int image_width = 0;
   int row = 0;
@@ -29,7 +29,8 @@ struct RowSegment {
   int columns = 0;
   int first_sample = 0;
   int samples = 0;
-  /// Places of the samples inside every pixel, in [0,1); empty: each sample takes a random one of its stratum.
+  /// Places of the samples inside every pixel, in [0,1); empty: each sample takes a random one of its
+  /// stratum.
   std::span<const glm::vec2> places = {};
 };
 

@@ -81,10 +81,9 @@ class RayPacket {
   alignas(64) RTCRayHit16 query_;
 };
 
-/// The scene, which must not go away, in Embree: one geometry per object, then one per rectangle light and per sphere
-/// light.
-/// Coordinates are relative to `origin`, so that a scene far from the world's origin is traced with the
-/// precision of one close to it.
+/// The scene, which must not go away, in Embree: one geometry per object, then one per rectangle light and
+/// per sphere light. Coordinates are relative to `origin`, so that a scene far from the world's origin is
+/// traced with the precision of one close to it.
 class RayScene {
  public:
   explicit RayScene(const Scene& scene);

@@ -28,7 +28,8 @@ void check_rays(std::span<const glm::vec3> origins, std::span<const glm::vec3> d
   }
 }
 
-/// Ray number `i` with all checks, its direction made a unit vector. Throws InvalidArgument if it is not usable.
+/// Ray number `i` with all checks, its direction made a unit vector. Throws InvalidArgument if it is not
+/// usable.
 Ray checked_ray(glm::vec3 origin, glm::vec3 direction, std::size_t i, glm::vec3 scene_origin) {
   if (!tracing::usable(origin)) {
     throw InvalidArgument("origins[" + std::to_string(i) + "]", text_of(origin),
@@ -81,8 +82,8 @@ class RayBatch {
     return ordinary;
   }
 
-  // Packets take rays through the same nodes: worth it if they start close together and keep together. A look at
-  // every fifth will do.
+  // Packets take rays through the same nodes: worth it if they start close together and keep together. A look
+  // at every fifth will do.
   bool are_alike() const {
     constexpr float kAlike = 0.9F;
     const Ray start = packet_.ray(0);

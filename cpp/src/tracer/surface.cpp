@@ -35,8 +35,8 @@ glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
   return length > 0.0F ? half / length : geometric;
 }
 
-// The shading normal bent by a texture (glTF 2.0 §3.9.3). The tangents are those of the triangle's plane, made upright to the
-// normal that is interpolated over it.
+// The shading normal bent by a texture (glTF 2.0 §3.9.3). The tangents are those of the triangle's plane,
+// made upright to the normal that is interpolated over it.
 glm::vec3 mapped_normal(const Scene& scene, const Material& material, const TriangleMesh& mesh,
                         const Surface& s, const std::array<glm::vec3, 3>& corners) {
   if (mesh.uvs.empty()) return s.normal;

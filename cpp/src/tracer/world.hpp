@@ -27,7 +27,8 @@ struct World {
   /// Number of a light's hit among the rectangle lights, then the sphere lights.
   int light_number(const Hit& hit) const { return static_cast<int>(hit.geometry - scene.objects.size()); }
 
-  /// Unit normal of what a ray hits, on the side from which triangles are counter-clockwise and spheres are round.
+  /// Unit normal of what a ray hits, on the side from which triangles are counter-clockwise and spheres are
+  /// round.
   glm::vec3 geometric_normal(const Ray& ray, const Hit& hit) const {
     if (!is_light(hit)) {
       const auto object = static_cast<int>(hit.geometry);

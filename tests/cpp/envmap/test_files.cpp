@@ -301,8 +301,8 @@ TEST_F(EnvMapFiles, SixtyThousandColumnsAreReadResampledAndSampled) {
   EXPECT_NEAR(integrate(cube)[0] / integrate(read)[0], 1.0, 1e-5);
 }
 
-// Directions per convention, from the documentation or source of each program: centre, right edge of the right
-// quarter, top of its panorama.
+// Directions per convention, from the documentation or source of each program: centre, right edge of the
+// right quarter, top of its panorama.
 TEST(Conventions, PanoramasLookWhereEachProgramLooks) {
   struct Case {
     const char* name;
@@ -343,8 +343,8 @@ TEST(Conventions, CubesGoThereAndBackExactly) {
   }
 }
 
-// ImfEnvmap.cpp of OpenEXR (CubeMap::pixelPosition): the top of ±X and ±Z is +y, of +Y it is +z, of −Y −z; to the
-// right of +X is +z, of −X −z, of ±Y +x, of +Z −x, of −Z +x.
+// ImfEnvmap.cpp of OpenEXR (CubeMap::pixelPosition): the top of ±X and ±Z is +y, of +Y it is +z, of −Y −z; to
+// the right of +X is +z, of −X −z, of ±Y +x, of +Z −x, of −Z +x.
 TEST(Conventions, OpenExrFacesAreOrientedAsInItsHeader) {
   const EnvMap exr = convert_convention(directions("cube", 8, 8), "openexr", ConventionWay::to_foreign);
   const auto at = [&](int face, int row, int column) {

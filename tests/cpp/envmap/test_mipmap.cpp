@@ -43,7 +43,8 @@ TEST(Mipmap, WeightedLevelsKeepTheMeanRadianceOfEveryProjectionAndSize) {
   }
 }
 
-// A light in the corner of a face, where texels are small, weighs too much in plain means: 2.3 times at the end.
+// A light in the corner of a face, where texels are small, weighs too much in plain means: 2.3 times at the
+// end.
 TEST(Mipmap, TheBoxFilterDoesNotKeepTheMeanRadiance) {
   EnvMap map = make_envmap({parse_projection("cube"), 64, 64, 1, 1});
   map.values[map.layout.index(0, 2, 1, 1)] = 100.0F;
@@ -51,8 +52,8 @@ TEST(Mipmap, TheBoxFilterDoesNotKeepTheMeanRadiance) {
   EXPECT_GT(integrate(mips, 6)[0] / integrate(mips, 0)[0], 2.0);
 }
 
-// [AEM] figure 4: with plain mips the faces differ at their edges up to the last level, where a face is one texel and
-// nothing changes inside of it. A smooth sky with a sun shows it.
+// [AEM] figure 4: with plain mips the faces differ at their edges up to the last level, where a face is one
+// texel and nothing changes inside of it. A smooth sky with a sun shows it.
 TEST(Mipmap, SeamsShowWithTheBoxFilterAndVanishWithTheSeamlessOne) {
   EnvMap map = make_envmap({parse_projection("cube"), 128, 128, 1, 1});
   for (int face = 0; face < 6; ++face) {
@@ -121,7 +122,8 @@ TEST(Border, HoldsTheNeighboursTexels) {
               map.layout.projection, face, column_center(column, kSize), row_center(row, kSize));
           const bool inside = row >= 0 && row < kSize && column >= 0 && column < kSize;
           if (repeats && !inside) continue;
-          // Within the texel that holds it: a texel is at most 0.4 rad across here (the corners of the angular map).
+          // Within the texel that holds it: a texel is at most 0.4 rad across here (the corners of the
+          // angular map).
           EXPECT_LT(glm::length(found - expected), inside ? 1e-6 : 0.3)
               << projection << ' ' << row << ' ' << column;
         }

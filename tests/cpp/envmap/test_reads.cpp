@@ -56,8 +56,9 @@ TEST(Reads, WeightsSumToOneOnEveryLevel) {
   }
 }
 
-// Along a great circle the filtered map has no step: a bilinear, seamless lookup is continuous, so over a step of
-// angle h it changes by at most (texels per radian, at most n at a face's centre... n/2·2) · h · range, here 64 h.
+// Along a great circle the filtered map has no step: a bilinear, seamless lookup is continuous, so over a
+// step of angle h it changes by at most (texels per radian, at most n at a face's centre... n/2·2) · h ·
+// range, here 64 h.
 TEST(Reads, LookupIsContinuousAcrossEdgesAndCorners) {
   const CubePyramidLayout layout = CubePyramidLayout::full(16);
   std::vector<float> map(layout.texels());
@@ -78,7 +79,8 @@ TEST(Reads, LookupIsContinuousAcrossEdgesAndCorners) {
   }
 }
 
-// A map that holds the direction's own y component is reproduced to the curvature of that function over a texel.
+// A map that holds the direction's own y component is reproduced to the curvature of that function over a
+// texel.
 TEST(Reads, ReproducesASmoothFunction) {
   const CubePyramidLayout layout = CubePyramidLayout::full(64);
   std::vector<float> map(layout.texels());
@@ -93,7 +95,8 @@ TEST(Reads, ReproducesASmoothFunction) {
   }
   for (std::uint32_t i = 0; i < 5000; ++i) {
     const glm::vec3 d = random_direction(i);
-    // Half a texel of 2/64 beyond an edge lies (2/64)²-close to the neighbour's plane extended; corners average three.
+    // Half a texel of 2/64 beyond an edge lies (2/64)²-close to the neighbour's plane extended; corners
+    // average three.
     EXPECT_NEAR(lookup(trilinear(layout, d, 0.0F), map), d.y, 2e-2F);
   }
 }
@@ -166,8 +169,9 @@ TEST(TapPattern, EvenElongationsAreEvenlySpacedTaps) {
   }
 }
 
-// A hardware's rounding may put a footprint on either side of where a pair of taps comes in: what is read must not care.
-// The value of a random map moves with the elongation by no more than its slope, with no step at 1¼, 2, 4, 6 …
+// A hardware's rounding may put a footprint on either side of where a pair of taps comes in: what is read
+// must not care. The value of a random map moves with the elongation by no more than its slope, with no step
+// at 1¼, 2, 4, 6 …
 TEST(Reads, NothingJumpsWhereTapsComeIn) {
   const TexelTopology topology = TexelTopology::cube(64);
   std::vector<float> map(topology.texels());

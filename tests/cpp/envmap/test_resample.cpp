@@ -74,8 +74,9 @@ TEST(Resample, ConstantsStayConstantBetweenAnyTwoProjections) {
   }
 }
 
-// Every texel against the mean of 160² places of it, weighted by solid angle, each reading the source's texel it lies
-// in. It is the reference that is inexact: its error falls with the number of places, 0.05 with 32² of them.
+// Every texel against the mean of 160² places of it, weighted by solid angle, each reading the source's texel
+// it lies in. It is the reference that is inexact: its error falls with the number of places, 0.05 with 32²
+// of them.
 TEST(Resample, MinificationIsTheMeanOverTheTexelsArea) {
   constexpr int kSize = 16;
   constexpr int kPlaces = 160;
@@ -121,7 +122,8 @@ TEST(Resample, FluxIsKeptBetweenAnyTwoProjections) {
     const EnvMap source = make_map(from, panorama ? 256 : 128, 128, lights);
     for (const char* to : kProjections) {
       const EnvMap result = resample(source, parse_projection(to), 64, 64, {ResampleFilter::area});
-      // The rim of a one-piece map is a single direction, around which a texel's edges are not straight in such a map.
+      // The rim of a one-piece map is a single direction, around which a texel's edges are not straight in
+      // such a map.
       const bool singular = std::string(from) != "cube" && std::string(from) != "latlong";
       const double tolerance = singular ? 2e-2 : 1e-3;
       EXPECT_NEAR(integrate(result)[0] / integrate(source)[0], 1.0, tolerance) << from << " to " << to;
@@ -137,8 +139,8 @@ TEST(Resample, FluxOfAPanoramaWithLightsSurvivesToOnePartIn10000) {
   }
 }
 
-// Bilinear interpolation misses a smooth function by its curvature over a texel, h²/8 of about 1, with h = 1/16 rad;
-// around a pole or beyond a rim the source's texels are further apart.
+// Bilinear interpolation misses a smooth function by its curvature over a texel, h²/8 of about 1, with h =
+// 1/16 rad; around a pole or beyond a rim the source's texels are further apart.
 TEST(Resample, MagnificationIsSmooth) {
   for (const char* from : {"cube", "dual_paraboloid", "latlong"}) {
     const EnvMap source = make_map(from, std::string(from) == "latlong" ? 128 : 64, 64, smooth);
@@ -248,8 +250,9 @@ TEST(Resample, ATexelThatIsNotFiniteStaysWhereItIs) {
   }
 }
 
-// Every texel of a face against the mean of interpolations at 24² places, with solid angles where the filter has the mean
-// ones of rows: over a texel they change by some 0.04, of which a hundredth of the steps between texels remains.
+// Every texel of a face against the mean of interpolations at 24² places, with solid angles where the filter
+// has the mean ones of rows: over a texel they change by some 0.04, of which a hundredth of the steps between
+// texels remains.
 TEST(Resample, MagnificationIsTheMeanOfInterpolation) {
   constexpr int kSize = 40;
   constexpr int kPlaces = 24;

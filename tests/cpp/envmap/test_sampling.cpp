@@ -64,8 +64,9 @@ TEST(Sampling, AConstantMapGivesItsValueForEveryFilterAndFootprint) {
   }
 }
 
-// A linear function of the direction is its own mean over a small symmetric footprint, here up to 0.1 rad; the maps
-// resolve it to their curvature over a texel, and mips shift it by part of a coarse texel of 0.1 rad.
+// A linear function of the direction is its own mean over a small symmetric footprint, here up to 0.1 rad;
+// the maps resolve it to their curvature over a texel, and mips shift it by part of a coarse texel of 0.1
+// rad.
 TEST(Sampling, FiltersKeepASmoothFunctionAcrossEdgesAndCorners) {
   for (const char* projection : kProjections) {
     const bool panorama = std::string(projection) == "latlong";
@@ -78,7 +79,8 @@ TEST(Sampling, FiltersKeepASmoothFunctionAcrossEdgesAndCorners) {
       const glm::vec3 b = 0.5F * glm::cross(d, a);
       const float expected = d.x + d.y - d.z;
       EXPECT_NEAR(look_up(map, d, a, b, SampleFilter::bilinear), expected, 0.04F) << projection << ' ' << i;
-      // Around a pole or the rim of the angular map texels are so elongated that square or bounded footprints blur.
+      // Around a pole or the rim of the angular map texels are so elongated that square or bounded footprints
+      // blur.
       if (panorama && std::abs(d.y) > 0.9F) continue;
       if (map.layout.projection.kind == ProjectionKind::angular && d.z > 0.5F) continue;
       EXPECT_NEAR(look_up(map, d, a, b, SampleFilter::trilinear), expected, 0.1F) << projection << ' ' << i;
@@ -87,8 +89,8 @@ TEST(Sampling, FiltersKeepASmoothFunctionAcrossEdgesAndCorners) {
   }
 }
 
-// Stripes one texel wide along one axis: a footprint elongated along the stripes keeps them where the square footprint
-// of the longer differential averages them away.
+// Stripes one texel wide along one axis: a footprint elongated along the stripes keeps them where the square
+// footprint of the longer differential averages them away.
 TEST(Sampling, EllipsesKeepWhatTheySkirt) {
   const EnvMap map = make_map("cube", 256, 256, [](glm::dvec3 d) {
     return std::fmod(std::floor(32.0 * (d.x / std::abs(d.z) + 4.0)), 2.0);

@@ -68,7 +68,8 @@ TEST(TexelTopology, RefusesSidesThatAreNoPowerOfTwo) {
   EXPECT_THROW(TexelTopology::atlas(8, 32768), InvalidArgument);
 }
 
-// The texel across an edge is the one whose centre is nearest among those outside of the face, and crossing back returns.
+// The texel across an edge is the one whose centre is nearest among those outside of the face, and crossing
+// back returns.
 TEST(Reads, TexelsAcrossEdgesAreTheNearestAndMutual) {
   for (int n : {1, 2, 4, 8}) {
     const TexelTopology layout = TexelTopology::cube(n);

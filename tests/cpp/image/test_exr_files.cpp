@@ -128,8 +128,8 @@ TEST_F(ExrFiles, EveryLosslessCompressionAndOrderOfLinesGivesTheSamePixels) {
   }
 }
 
-// Values of at most 16 and steps of 1/64: B44 keeps 6 bits of a block's range, DWA's default is visually lossless, PXR24 rounds
-// to 24 bits.
+// Values of at most 16 and steps of 1/64: B44 keeps 6 bits of a block's range, DWA's default is visually
+// lossless, PXR24 rounds to 24 bits.
 TEST_F(ExrFiles, LossyCompressionsGiveNearlyTheSamePixelsOnAnyNumberOfThreads) {
   const Imath::Box2i window(Imath::V2i(0, 0), Imath::V2i(63, 599));
   std::vector<float> ramp(64 * 600);

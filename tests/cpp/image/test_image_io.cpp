@@ -220,8 +220,8 @@ TEST_F(ImageFiles, HdrRoundsToTheNearestMantissaAndKeepsTheMean) {
       sum_again += static_cast<double>(again.pixels[i + c]);
     }
   }
-  // Cutting off loses half a step of each value on average, 5e-3. Rounding leaves the noise of some 2,000 bright values
-  // of ±0.2 % each, 5e-5, and more where neighbours go together.
+  // Cutting off loses half a step of each value on average, 5e-3. Rounding leaves the noise of some 2,000
+  // bright values of ±0.2 % each, 5e-5, and more where neighbours go together.
   EXPECT_NEAR(sum_again / sum, 1.0, 5e-4);
 }
 

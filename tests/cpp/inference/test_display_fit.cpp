@@ -121,8 +121,9 @@ TEST(DisplayFit, FindsMapsOfAllShellsAndPartsThatShowTheTarget) {
   }
 }
 
-// Light that no map can show, different in every sample: fitting the pixel spends the texels on what is seen of each
-// layer, F and what is in front of it taken into account, and so comes nearer than fitting the layers.
+// Light that no map can show, different in every sample: fitting the pixel spends the texels on what is seen
+// of each layer, F and what is in front of it taken into account, and so comes nearer than fitting the
+// layers.
 TEST(DisplayFit, ComesNearerToThePixelsThanLayersApart) {
   const SurfaceSamples samples = ball(40, 4, [](const SurfaceSamples& s, std::size_t i, std::size_t k) {
     const float x = 0.5F + 0.5F * std::sin(40.0F * s.position[i].x) * std::cos(30.0F * s.position[i].y);

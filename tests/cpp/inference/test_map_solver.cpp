@@ -126,8 +126,8 @@ std::vector<float> random_around(float centre, std::size_t count, std::uint64_t 
   return values;
 }
 
-// The solution of the same problem by dense normal equations in double, for a target bright enough to stay within the
-// bounds by itself.
+// The solution of the same problem by dense normal equations in double, for a target bright enough to stay
+// within the bounds by itself.
 TEST(MapSolver, AgreesWithADenseSolve) {
   const Problem problem = make_problem(24, 4, 8);
   SolveOptions options;
@@ -176,8 +176,8 @@ TEST(MapSolver, AgreesWithADenseSolve) {
   }
 }
 
-// The conditions of Karush, Kuhn and Tucker: where a texel is inside its bounds the gradient vanishes, where it is dark
-// the gradient does not want it brighter.
+// The conditions of Karush, Kuhn and Tucker: where a texel is inside its bounds the gradient vanishes, where
+// it is dark the gradient does not want it brighter.
 TEST(MapSolver, IsTheBestMapWithinTheBounds) {
   const Problem problem = make_problem(24, 4, 8);
   SolveOptions options;
@@ -228,7 +228,8 @@ TEST(MapSolver, ReproducesATargetThatAMapCanMake) {
   EXPECT_LT(solution.report.rms_error, 5e-3);
 }
 
-// Scaling the light scales the solution: nothing in the solver has a unit. A power of two changes no rounding.
+// Scaling the light scales the solution: nothing in the solver has a unit. A power of two changes no
+// rounding.
 TEST(MapSolver, IsLinearOverTenOrdersOfRadiance) {
   const Problem problem = make_problem(32, 4, 16);
   const MapSolver solver = make_solver(problem.matrix, problem.layout);
@@ -275,8 +276,8 @@ TEST(MapSolver, FallsBackToThePriorWhereNothingIsSeen) {
   // A target that the prior explains leaves it as it is, seen or not.
   const MapSolution same = solve(solver, problem.row_weights, multiply(problem.matrix, prior, 1), 1, prior);
   for (std::size_t i = 0; i < prior.size(); ++i) ASSERT_NEAR(same.texels[i], prior[i], 1e-5F);
-  // Straight up is seen by this part, the upper half of the sphere; straight down is a quarter circle away from all
-  // that it sees. The one follows the target, the other stays near the prior.
+  // Straight up is seen by this part, the upper half of the sphere; straight down is a quarter circle away
+  // from all that it sees. The one follows the target, the other stays near the prior.
   const MapSolution other =
       solve(solver, problem.row_weights, std::vector<float>(problem.matrix.rows(), 5.0F), 1, prior);
   const std::size_t up = problem.layout.index(0, 2, 8, 8);
@@ -367,8 +368,8 @@ TEST(MapSolver, RejectsBadInputWithItsCount) {
   EXPECT_THROW(make_solver(problem.matrix, problem.layout, endless), InvalidArgument);
 }
 
-// Views of blends: the blend of the solved nodes shows what each view wants, where one map could not. Between the nodes,
-// a view's row is spread over both.
+// Views of blends: the blend of the solved nodes shows what each view wants, where one map could not. Between
+// the nodes, a view's row is spread over both.
 TEST(MapSolver, NodesAreFoundFromViewsOfTheirBlends) {
   const Problem problem = make_problem(48, 4, 16);
   const std::size_t texels = problem.layout.texels();

@@ -16,8 +16,8 @@ namespace {
 const Proxy kBox{Box{{0.1F, 0.0F, 0.2F}, {4.0F, 3.0F, 5.0F}}, {0.0F, 0.2F, 0.0F}};
 const Proxy kEllipsoid{Ellipsoid{{0.0F, 0.0F, 0.0F}, {1.5F, 1.2F, 1.3F}}, {0.0F, 0.0F, 0.0F}};
 
-// The rendering matrix and the renderer are the same linear function: for random maps, and for maps with a single
-// texel lit, which is how [PEM] §4 measures the matrix.
+// The rendering matrix and the renderer are the same linear function: for random maps, and for maps with a
+// single texel lit, which is how [PEM] §4 measures the matrix.
 TEST(Render, AgreesWithTheRenderingMatrixForRandomMaps) {
   const SurfaceSamples samples = testing::mirror_sphere_samples(40, 5);
   const CubePyramidLayout layout = CubePyramidLayout::full(16);

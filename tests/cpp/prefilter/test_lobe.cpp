@@ -47,7 +47,8 @@ TEST(Lobe, WidthsOfPhongAndMicrofacetsConvert) {
   }
 }
 
-// Smooth surfaces reflect everything, and Schlick's share is (1 − cos θ)^5; rough ones lose what bounces twice.
+// Smooth surfaces reflect everything, and Schlick's share is (1 − cos θ)^5; rough ones lose what bounces
+// twice.
 TEST(SplitSum, IsFresnelForSmoothSurfacesAndLosesLightWithRoughness) {
   for (const double cosine : {0.2, 0.5, 0.9}) {
     const SplitSum smooth = split_sum(cosine, 1e-3);

@@ -36,7 +36,8 @@ TEST(Projection, CubeSolidAnglesSumToTheSphere) {
   }
 }
 
-// The texel's solid angle is its area times the density (1+x²+y²)^(−3/2), here by long double midpoint and Simpson.
+// The texel's solid angle is its area times the density (1+x²+y²)^(−3/2), here by long double midpoint and
+// Simpson.
 TEST(Projection, CubeSolidAngleKeepsItsDigitsAt16384) {
   constexpr int kSize = 16384;
   const long double step = 2.0L / kSize;

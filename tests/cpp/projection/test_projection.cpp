@@ -43,8 +43,9 @@ class EveryProjection : public testing::TestWithParam<const char*> {
   const Projection projection_ = parse_projection(GetParam());
 };
 
-// Half a unit in the last place of a coordinate is 3e-8, or 9e-8 rad where 1 is π, on two axes, and a float32 direction
-// is itself rounded by some 5e-8 rad. The sphere map stretches the error by 1/cos(θ/2) towards its singularity.
+// Half a unit in the last place of a coordinate is 3e-8, or 9e-8 rad where 1 is π, on two axes, and a float32
+// direction is itself rounded by some 5e-8 rad. The sphere map stretches the error by 1/cos(θ/2) towards its
+// singularity.
 TEST_P(EveryProjection, RoundTripInFloat32IsWithin2e7Radians) {
   std::vector<glm::vec3> directions = random_directions(100000);
   for (float x : {1.0F, -1.0F, 0.0F, -0.0F}) {
@@ -114,8 +115,8 @@ TEST_P(EveryProjection, SolidAnglesSumToWhatTheMapCovers) {
   }
 }
 
-// Away from the rim a texel of 2/16384 has the solid angle of its area times the density, here integrated with
-// Simpson's rule in long double: the density's fourth derivative times (1/16384)⁴ is below 1e-15 of it.
+// Away from the rim a texel of 2/16384 has the solid angle of its area times the density, here integrated
+// with Simpson's rule in long double: the density's fourth derivative times (1/16384)⁴ is below 1e-15 of it.
 TEST_P(EveryProjection, SolidAnglesKeepTheirDigitsAt16384) {
   constexpr int kSize = 16384;
   for (int column : {8191, 8192, 9000, 11000, 13500}) {
@@ -212,7 +213,8 @@ double density_ratio(const char* name) {
   return largest / smallest;
 }
 
-// [EMT] §2: the samples lie at most 3√3 times as dense in a cube map, 4 times in a paraboloid; a sphere map is even.
+// [EMT] §2: the samples lie at most 3√3 times as dense in a cube map, 4 times in a paraboloid; a sphere map
+// is even.
 TEST(Projection, DensityRatiosAreThoseOfTheTutorial) {
   EXPECT_NEAR(density_ratio("cube"), 3.0 * std::sqrt(3.0), 1e-12);
   EXPECT_NEAR(density_ratio("dual_paraboloid"), 4.0, 0.01);  // the grid ends just short of the rim

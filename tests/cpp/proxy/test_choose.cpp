@@ -44,7 +44,8 @@ struct Rays {
   TracedRays traced() const { return {positions, directions, distances, views}; }
 };
 
-/// Reflections off a ball of 0.1 m at the origin, seen from 1 m away at the given angles about the vertical, 20° above.
+/// Reflections off a ball of 0.1 m at the origin, seen from 1 m away at the given angles about the vertical,
+/// 20° above.
 Rays reflections(const Surroundings& surroundings, const std::vector<double>& degrees, int per_view,
                  std::uint32_t seed) {
   Rays rays;

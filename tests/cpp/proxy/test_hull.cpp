@@ -44,7 +44,8 @@ Mesh torus(float ring, float tube, unsigned segments, unsigned rings) {
   return mesh;
 }
 
-// Outside of the top and bottom circles (x² + z² > ring²) a torus is its own convex hull, inside it is the dent.
+// Outside of the top and bottom circles (x² + z² > ring²) a torus is its own convex hull, inside it is the
+// dent.
 TEST(HullTriangles, AreTheOuterHalfOfATorus) {
   const Mesh mesh = torus(1.0F, 0.4F, 90, 60);
   const auto on_hull = hull_triangles(mesh.positions, mesh.triangles);
@@ -88,7 +89,8 @@ TEST(HullTriangles, AreAllOfAConvexSolidDespiteFloatVertices) {
   }
   std::size_t count = 0;
   for (std::uint8_t on : hull_triangles(mesh.positions, mesh.triangles)) count += on;
-  // Next to the poles triangles are slivers of 1e-4 m whose planes the rounding (2.4e-7 m) turns by milliradians.
+  // Next to the poles triangles are slivers of 1e-4 m whose planes the rounding (2.4e-7 m) turns by
+  // milliradians.
   EXPECT_GT(count, mesh.triangles.size() - 250);
 }
 

@@ -8,7 +8,8 @@
 
 namespace mirrorbake::testing {
 
-/// A document of one quadrilateral (0,0,0)…(1,1,0) that tests fill with materials, nodes and what else they need.
+/// A document of one quadrilateral (0,0,0)…(1,1,0) that tests fill with materials, nodes and what else they
+/// need.
 struct GltfScene {
   std::string nodes = R"([{"mesh":0,"name":"quad"}])";
   std::string roots = "[0]";

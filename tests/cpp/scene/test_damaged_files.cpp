@@ -1,4 +1,5 @@
-// Files damaged at random, by the entry points that libFuzzer uses too (tests/fuzz): each loads or is a FileError.
+// Files damaged at random, by the entry points that libFuzzer uses too (tests/fuzz): each loads or is a
+// FileError.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -29,7 +30,8 @@ void run(char format, const std::string& bytes,
   EXPECT_NO_THROW(entry(reinterpret_cast<const std::uint8_t*>(input.data()), input.size()));
 }
 
-// Overwrites, removes, repeats or inserts a few bytes; often with characters that mean something in the formats.
+// Overwrites, removes, repeats or inserts a few bytes; often with characters that mean something in the
+// formats.
 std::string damaged(std::string bytes, std::mt19937& random) {
   constexpr std::string_view kTelling = "0123456789-+.eE/ \n\r\t{}[]\",:vfnt\\\0\xff";
   const auto below = [&](std::size_t n) {

@@ -23,7 +23,8 @@ using testing::glb;
 using ::testing::HasSubstr;
 using Gltf = testing::FileTest;
 
-// One quadrilateral as two triangles: 4 positions, 4 normals, 4 uvs (float), 6 indices (uint16), in this order.
+// One quadrilateral as two triangles: 4 positions, 4 normals, 4 uvs (float), 6 indices (uint16), in this
+// order.
 std::string quad_buffer() {
   return bytes_of(std::vector<float>{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) +
          bytes_of(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}) +

@@ -41,7 +41,8 @@ TEST_F(Obj, ReadsFacesOfEveryNotation) {
 }
 
 TEST_F(Obj, MakesMissingNormalsByAngleWeightedAveraging) {
-  // Whatever the triangulation, the three right angles at a cube's corner give the diagonal; area weights would not.
+  // Whatever the triangulation, the three right angles at a cube's corner give the diagonal; area weights
+  // would not.
   const TriangleMesh mesh = load_mesh(write("cube.obj", kCube));
   EXPECT_EQ(mesh.positions.size(), 8U);
   EXPECT_EQ(mesh.triangles.size(), 12U);

@@ -120,7 +120,8 @@ TEST_F(TextureFiles, WideFootprintsFindMeans) {
   const TextureFile file(path);
   const glm::vec3 wide = file.lookup({0.3F, 0.6F}, 1.0F, TextureWrap::repeat, TextureWrap::repeat);
   EXPECT_LT(glm::distance(wide, file.mean()), 1e-3F);
-  // Uniform noise has a variance of 1/12; the mean of 16 × 16 texels has 1/256 of that, a standard deviation of 0.018.
+  // Uniform noise has a variance of 1/12; the mean of 16 × 16 texels has 1/256 of that, a standard deviation
+  // of 0.018.
   double square = 0.0;
   for (int i = 0; i < 400; ++i) {
     const glm::vec2 uv(0.05F * static_cast<float>(i % 20), 0.05F * static_cast<float>(i / 20));

@@ -228,8 +228,8 @@ TEST(Fresnel, AnyNumberOfThreadsAndAnyAlignmentGiveTheSameBits) {
   }
 }
 
-// Large arrays are written past the caches in whole aligned vectors, and from their ends where the output lies a
-// little more than whole pages behind the input.
+// Large arrays are written past the caches in whole aligned vectors, and from their ends where the output
+// lies a little more than whole pages behind the input.
 TEST(Fresnel, SizeAndPlaceOfArraysDoNotChangeTheBits) {
   const std::vector<float> some = cosines();
   for (const std::size_t count : {std::size_t{1000}, (std::size_t{1} << 20) + 1003}) {

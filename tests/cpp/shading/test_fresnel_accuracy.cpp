@@ -80,7 +80,8 @@ Worst sweep(const FloatBatch& batch, const std::function<long double(float)>& ex
   return worst;
 }
 
-/// The same against the batches of doubles, which other tests hold against 50 digits: fast enough for every cosine.
+/// The same against the batches of doubles, which other tests hold against 50 digits: fast enough for every
+/// cosine.
 Worst sweep_against_double(const FloatBatch& batch,
                            const std::function<void(std::span<const double>, std::span<double>)>& exact) {
   const char* option = std::getenv("MIRRORBAKE_FRESNEL_SWEEP");

@@ -39,8 +39,8 @@ TEST(FresnelTable, MeetsTheWantedErrorWithTheFewestEntries) {
   }
 }
 
-// The largest second derivative of Schlick's curve is 20(1 − r0) at c = 0, so the error of the first interval of width
-// h tends to 20(1 − r0)h²/8.
+// The largest second derivative of Schlick's curve is 20(1 − r0) at c = 0, so the error of the first interval
+// of width h tends to 20(1 − r0)h²/8.
 TEST(FresnelTable, SizeForSchlickIsWhatItsSecondDerivativeAsksFor) {
   const auto exact = reflectance_function({FresnelModel::schlick, glm::vec3(0.04F)}, 1);
   const double h = std::sqrt(8 * 1e-5 / (20 * 0.96));

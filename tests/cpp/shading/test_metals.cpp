@@ -9,9 +9,9 @@
 namespace mirrorbake {
 namespace {
 
-// Expected: the same spectra through colour-science 0.4.7 (sd_to_XYZ, XYZ_to_RGB), whose matrix has more digits than
-// that of IEC 61966-2-1. For chromium and aluminium Akenine-Möller et al., Real-Time Rendering, 4th ed., table 9.2, has
-// (0.549, 0.556, 0.554) and (0.913, 0.922, 0.924).
+// Expected: the same spectra through colour-science 0.4.7 (sd_to_XYZ, XYZ_to_RGB), whose matrix has more
+// digits than that of IEC 61966-2-1. For chromium and aluminium Akenine-Möller et al., Real-Time Rendering,
+// 4th ed., table 9.2, has (0.549, 0.556, 0.554) and (0.913, 0.922, 0.924).
 TEST(Metals, ColoursAreThoseOfAnIndependentIntegration) {
   const auto expect = [](Metal metal, glm::dvec3 rgb) {
     const glm::dvec3 ours = metal_reflectance(metal, 1.0);

@@ -10,8 +10,9 @@
 
 namespace mirrorbake::testing {
 
-/// Surface samples of a mirror sphere of radius `radius` at the origin, seen from +Z by an orthographic camera whose
-/// image just holds it: closed forms for everything, no ray tracer needed. The upper half is part 0, the lower part 1.
+/// Surface samples of a mirror sphere of radius `radius` at the origin, seen from +Z by an orthographic
+/// camera whose image just holds it: closed forms for everything, no ray tracer needed. The upper half is
+/// part 0, the lower part 1.
 inline SurfaceSamples mirror_sphere_samples(int size, int samples_per_pixel, float radius = 1.0F) {
   SurfaceSamples samples;
   samples.width = samples.height = size;

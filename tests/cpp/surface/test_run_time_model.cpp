@@ -17,7 +17,8 @@ TEST(RunTimeModel, NamedModelsAreValidAndFoundByTheirName) {
   EXPECT_THROW(run_time_model("web2"), InvalidArgument);
 }
 
-// A rotated grid is one in which no two lookups share a row or a column, and whose mean is the pixel's centre.
+// A rotated grid is one in which no two lookups share a row or a column, and whose mean is the pixel's
+// centre.
 TEST(RunTimeModel, WebHasOneLookupInEveryRowAndColumn) {
   std::set<float> columns, rows;
   glm::vec2 sum(0.0F);

@@ -83,8 +83,8 @@ TEST(Adaptive, SamplesGoWhereTheNoiseIs) {
   EXPECT_LT(difference(trace, other), difference(flat, other_flat));
 }
 
-// Counts that depended on a pixel's own samples would end early where these happen to agree. The mean over many traces
-// against one of many samples: 48 × 8 and more samples each.
+// Counts that depended on a pixel's own samples would end early where these happen to agree. The mean over
+// many traces against one of many samples: 48 × 8 and more samples each.
 TEST(Adaptive, MeansAreUnbiased) {
   const RingInRoom room;
   const auto mean_of = [](const LayerTrace& trace) {

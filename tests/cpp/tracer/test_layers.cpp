@@ -45,8 +45,8 @@ struct InvariantError {
   int local = 0;  // samples that meet the reflector again
 };
 
-// D + F (L_local + (1 − α) L_distant) is the beauty of the same sample (spec T4). With one sample per pixel the image of the
-// beauty integrator, which knows nothing of layers, has a pixel per sample.
+// D + F (L_local + (1 − α) L_distant) is the beauty of the same sample (spec T4). With one sample per pixel
+// the image of the beauty integrator, which knows nothing of layers, has a pixel per sample.
 InvariantError invariant_error(const Tracer& tracer, const Camera& camera, int reflector,
                                TraceOptions options) {
   InvariantError error;

@@ -112,8 +112,9 @@ TEST(Light, RectangleLightGivesItsFormFactor) {
   }
 }
 
-// A flat mirror shows a lamp's image as far behind it as the lamp is in front: the floor receives the image's form
-// factor, less what the mirror swallows. Such light is found by rays that hit the mirror where the lamp is seen in it.
+// A flat mirror shows a lamp's image as far behind it as the lamp is in front: the floor receives the image's
+// form factor, less what the mirror swallows. Such light is found by rays that hit the mirror where the lamp
+// is seen in it.
 TEST(Light, FlatMirrorThrowsTheLampsImageOnTheFloor) {
   constexpr float kLampHeight = 1.0F;
   constexpr float kMirrorHeight = 3.0F;
@@ -138,8 +139,9 @@ TEST(Light, FlatMirrorThrowsTheLampsImageOnTheFloor) {
       3.0 * kReflectance * (corner_form_factor(1.4, 0.4, height) - corner_form_factor(1.0, 0.4, height));
   const Estimate got = estimate(tracer.trace_beauty(spot(point), options));
   EXPECT_NEAR(got.mean, expected, 4.0 * got.error + 1e-4 * expected);
-  // A cosine distribution finds the image with the probability p of its form factor, 0.0018: a pixel's mean of 64 is off
-  // by √((1/p − 1)/64) = 2.9 times itself, that of 64² pixels by 4.6 %. The guide is to do five times as well.
+  // A cosine distribution finds the image with the probability p of its form factor, 0.0018: a pixel's mean
+  // of 64 is off by √((1/p − 1)/64) = 2.9 times itself, that of 64² pixels by 4.6 %. The guide is to do five
+  // times as well.
   EXPECT_LT(got.error, 0.009 * expected);
   EXPECT_GT(got.error, 0.0);
 }
@@ -428,8 +430,8 @@ TEST(Light, EnvironmentFollowsTheLatitudeLongitudeConvention) {
   }
 }
 
-// A sky of 1 with a sun of one texel. Next-event estimation alone looks for all of it; where rays follow the cosine, it
-// looks for the sun only, and the answer is the same.
+// A sky of 1 with a sun of one texel. Next-event estimation alone looks for all of it; where rays follow the
+// cosine, it looks for the sun only, and the answer is the same.
 TEST(Light, EvenPartOfTheSkyIsLeftToFollowedRays) {
   Scene scene;
   add_object(scene, floor_at(0.0F), matte(glm::vec3(1.0F)));
@@ -536,8 +538,8 @@ TEST(Light, CaptureSeesTheSkyWithItsConventionAndSkipsWhatIsHidden) {
       EXPECT_NEAR(cube.at(x, row)[1], 1.0F + d.z, 0.02F);
     }
   }
-  // With the floor, the lower half is lit from above, but for the quarter of the irradiance that the ball takes away right
-  // below it. Of 1024 samples the standard error is 1 %.
+  // With the floor, the lower half is lit from above, but for the quarter of the irradiance that the ball
+  // takes away right below it. Of 1024 samples the standard error is 1 %.
   TraceOptions many;
   many.samples_per_pixel = 1024;
   const Image with_floor = tracer.capture_cube(glm::vec3(0.0F), size, {&ball, 1}, many);

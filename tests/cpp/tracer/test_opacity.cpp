@@ -145,7 +145,8 @@ TEST(Opacity, LetsTheLightThroughThatIsNotStopped) {
   }
 }
 
-// Next-event estimation chooses points of the lamp, of which some are not there; rays that meet it by chance know.
+// Next-event estimation chooses points of the lamp, of which some are not there; rays that meet it by chance
+// know.
 TEST(Opacity, OfALampScalesItsLight) {
   Material material = sheet(1.0F);
   material.emission = glm::vec3(4.0F);

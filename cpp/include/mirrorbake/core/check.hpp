@@ -12,8 +12,8 @@
 
 #include "mirrorbake/core/error.hpp"
 
-/// What public functions ask of their arguments, each asked in one place. All throw InvalidArgument, which names the
-/// argument, its value and what was expected.
+/// What public functions ask of their arguments, each asked in one place. All throw InvalidArgument, which
+/// names the argument, its value and what was expected.
 namespace mirrorbake {
 
 template <std::floating_point Real>

@@ -27,8 +27,8 @@ class ThreadLimit {
 /// Number of threads that parallel loops use now.
 int thread_count();
 
-/// Calls `body(begin, end)` for consecutive chunks of `grain` indices of [0, count), in parallel. `grain` ≥ 1.
-/// An exception thrown by `body` is rethrown here.
+/// Calls `body(begin, end)` for consecutive chunks of `grain` indices of [0, count), in parallel. `grain` ≥
+/// 1. An exception thrown by `body` is rethrown here.
 void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body);
 

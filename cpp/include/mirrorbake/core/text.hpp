@@ -8,8 +8,8 @@
 
 namespace mirrorbake {
 
-/// The text with every byte that is not part of valid UTF-8 replaced by U+FFFD. Names and messages that quote a file
-/// pass through here: Python's strings, terminals and JSON accept nothing else.
+/// The text with every byte that is not part of valid UTF-8 replaced by U+FFFD. Names and messages that quote
+/// a file pass through here: Python's strings, terminals and JSON accept nothing else.
 std::string valid_utf8(std::string_view text);
 
 /// Shortest text that reads back as the same number, for messages: "0.5", "1e-12", "nan", "-inf".

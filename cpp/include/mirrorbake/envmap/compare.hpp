@@ -15,7 +15,8 @@ struct Comparison {
   std::size_t not_finite = 0;  ///< texel values that are NaN or infinite in either map, left out of the rest
 };
 
-/// The finest level of `a` against the reference `b`. Throws InvalidArgument unless projection, size and channels agree.
+/// The finest level of `a` against the reference `b`. Throws InvalidArgument unless projection, size and
+/// channels agree.
 Comparison compare(const EnvMapView& a, const EnvMapView& b);
 
 }  // namespace mirrorbake

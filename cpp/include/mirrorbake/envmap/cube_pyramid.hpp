@@ -8,8 +8,8 @@
 /// Order of the texels of a cube map with all its mip levels.
 namespace mirrorbake {
 
-/// Levels one after the other, the finest first; in a level the six faces; in a face the rows from the top. Level l
-/// has faces of max(1, size >> l) texels a side; there are floor(log2(size)) + 1 levels.
+/// Levels one after the other, the finest first; in a level the six faces; in a face the rows from the top.
+/// Level l has faces of max(1, size >> l) texels a side; there are floor(log2(size)) + 1 levels.
 struct CubePyramidLayout {
   int size = 1;    ///< texels along a side of the finest level, 1…16384
   int levels = 1;  ///< how many of the levels exist, counted from the finest
@@ -28,9 +28,9 @@ struct CubePyramidLayout {
   }
 };
 
-/// The whole pyramid (texels × channels) of a cube map (6 × size × size × channels): every level is the mean of the
-/// finer one's 2×2 texels weighted by their solid angles ([EMT] §2.4; spec E3 b), which keeps the mean radiance over
-/// the sphere. Throws InvalidArgument if `faces` has another size.
+/// The whole pyramid (texels × channels) of a cube map (6 × size × size × channels): every level is the mean
+/// of the finer one's 2×2 texels weighted by their solid angles ([EMT] §2.4; spec E3 b), which keeps the mean
+/// radiance over the sphere. Throws InvalidArgument if `faces` has another size.
 std::vector<float> build_cube_pyramid(std::span<const float> faces, const CubePyramidLayout& layout,
                                       int channels);
 

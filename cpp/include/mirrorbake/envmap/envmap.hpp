@@ -10,9 +10,9 @@
 /// The environment map container (spec E1): one block of float32 values, a projection, and nothing else.
 namespace mirrorbake {
 
-/// Order of the values: levels, the finest first; in a level the faces; in a face the rows from the top; in a row the
-/// texels; in a texel the channels. Level l has faces of max(1, width >> l) × max(1, height >> l) texels. For a cube
-/// map it is the order of CubePyramidLayout.
+/// Order of the values: levels, the finest first; in a level the faces; in a face the rows from the top; in a
+/// row the texels; in a texel the channels. Level l has faces of max(1, width >> l) × max(1, height >> l)
+/// texels. For a cube map it is the order of CubePyramidLayout.
 struct EnvMapLayout {
   Projection projection;
   int width = 1;  ///< texels of a face of the finest level
@@ -44,7 +44,8 @@ struct EnvMapLayout {
 /// Number of levels down to 1×1: floor(log2(max(width, height))) + 1.
 int full_level_count(int width, int height);
 
-/// Throws InvalidArgument unless sides are 1…65536 (a cube's equal), channels 1…1024, levels 1…the full count.
+/// Throws InvalidArgument unless sides are 1…65536 (a cube's equal), channels 1…1024, levels 1…the full
+/// count.
 void validate(const EnvMapLayout& layout);
 
 /// Somebody else's memory seen as an environment map.
@@ -74,7 +75,8 @@ struct EnvMap {
 /// A map of zeros. Throws InvalidArgument for a layout that is not valid or names of another number.
 EnvMap make_envmap(const EnvMapLayout& layout, std::span<const std::string> channels = {});
 
-/// Σ L Ω over the sphere for every channel of a level, in double: the flux of the map (radiance times steradian).
+/// Σ L Ω over the sphere for every channel of a level, in double: the flux of the map (radiance times
+/// steradian).
 std::vector<double> integrate(const EnvMapView& map, int level = 0);
 
 /// Number of NaN and infinite values.

@@ -11,49 +11,51 @@
 namespace mirrorbake {
 
 /// How the faces of a map share an image. `automatic`: reading, by the shape of the image; writing, `strip`.
-/// `strip`: side by side in their order. `column`: one below the other. `grid`: three by two, in reading order.
-/// `cross` (4×3) and `vertical_cross` (3×4), empty parts black; faces that touch there touch on the sphere, and of the
-/// vertical cross −Z at the bottom is turned by 180°:
+/// `strip`: side by side in their order. `column`: one below the other. `grid`: three by two, in reading
+/// order. `cross` (4×3) and `vertical_cross` (3×4), empty parts black; faces that touch there touch on the
+/// sphere, and of the vertical cross −Z at the bottom is turned by 180°:
 ///
 ///            +Y                       +Y
 ///         −X +Z +X −Z              −X +Z +X
 ///            −Y                       −Y
 ///                                     −Z
 ///
-/// `files`: one image per face; the path has `{}` where px, nx, py, ny, pz, nz goes (front, back for the paraboloid).
+/// `files`: one image per face; the path has `{}` where px, nx, py, ny, pz, nz goes (front, back for the
+/// paraboloid).
 enum class FaceLayout { automatic, strip, column, grid, cross, vertical_cross, files };
 
 FaceLayout parse_face_layout(std::string_view name);
 std::string_view to_string(FaceLayout layout);
 
-/// One level of a map as an image; a map of one face is its face. Throws InvalidArgument for a cross or grid of
-/// anything but a cube, and for `files`.
+/// One level of a map as an image; a map of one face is its face. Throws InvalidArgument for a cross or grid
+/// of anything but a cube, and for `files`.
 Image pack_faces(const EnvMapView& map, int level, FaceLayout layout);
 
-/// The map in an image. `projection` nothing: 2:1 is a latlong, shapes of a cube's layouts (6:1, 1:6, 3:2, 4:3, 3:4) are
-/// cubes. Throws InvalidArgument if the shape of the image does not fit.
+/// The map in an image. `projection` nothing: 2:1 is a latlong, shapes of a cube's layouts (6:1, 1:6, 3:2,
+/// 4:3, 3:4) are cubes. Throws InvalidArgument if the shape of the image does not fit.
 EnvMap unpack_faces(const Image& image, const std::optional<Projection>& projection, FaceLayout layout);
 
-/// Reads any image format, or KTX2 by its extension. A path with `{}` names one image per face. Throws FileError, also
-/// for a shape that fits no projection.
+/// Reads any image format, or KTX2 by its extension. A path with `{}` names one image per face. Throws
+/// FileError, also for a shape that fits no projection.
 EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection = std::nullopt,
                    FaceLayout layout = FaceLayout::automatic, const ImageLimits& limits = {});
 
-/// Reads a map as light: a latlong of R, G and B, grey repeated, without alpha, depth and other channels. A picture of 2:1 is
-/// one; cubes are recognised, and resampled, as KTX2 files, by 6:1 or 1:6, and as crosses whose corners are all alike.
-/// Throws FileError for any other picture, which is no panorama unless somebody says so, for no or several layers of
-/// colours among which `choice` has not chosen, and for what load_image refuses.
+/// Reads a map as light: a latlong of R, G and B, grey repeated, without alpha, depth and other channels. A
+/// picture of 2:1 is one; cubes are recognised, and resampled, as KTX2 files, by 6:1 or 1:6, and as crosses
+/// whose corners are all alike. Throws FileError for any other picture, which is no panorama unless somebody
+/// says so, for no or several layers of colours among which `choice` has not chosen, and for what load_image
+/// refuses.
 Image load_panorama(const std::string& path, const ImageChoice& choice = {}, const ImageLimits& limits = {});
 
-/// What save_envmap would refuse whatever the map's values are, before they are computed. Throws FileError for a path that
-/// cannot be written or stored in `format`; InvalidArgument for a layout or `{}` that does not fit the projection, and a
-/// layout of faces in a KTX2 file, which has its own. Nothing is written.
+/// What save_envmap would refuse whatever the map's values are, before they are computed. Throws FileError
+/// for a path that cannot be written or stored in `format`; InvalidArgument for a layout or `{}` that does
+/// not fit the projection, and a layout of faces in a KTX2 file, which has its own. Nothing is written.
 void check_envmap_path(const std::string& path, const Projection& projection,
                        FaceLayout layout = FaceLayout::automatic,
                        PixelFormat format = PixelFormat::automatic);
 
-/// Writes the finest level as an image, or all levels as KTX2. Throws as check_envmap_path does, and as save_image and
-/// save_ktx2 do.
+/// Writes the finest level as an image, or all levels as KTX2. Throws as check_envmap_path does, and as
+/// save_image and save_ktx2 do.
 SaveReport save_envmap(const std::string& path, const EnvMapView& map,
                        FaceLayout layout = FaceLayout::automatic,
                        PixelFormat format = PixelFormat::automatic);

@@ -11,10 +11,10 @@ namespace mirrorbake {
 /// Whether the extension is .ktx2, in capitals or not.
 bool is_ktx2(const std::string& path);
 
-/// Writes a cube map as float16 (`automatic`, `half`) or float32, atomically: one channel as R, two as RG, three and four as
-/// RGBA. Of three channels the file says that its alpha is to be read as 1 (KTXswizzle "rgb1"). Values beyond ±65504 are
-/// clamped to float16 and counted. Throws InvalidArgument if the map is not a cube of one to four channels, FileError if
-/// the file cannot be written or `format` is another.
+/// Writes a cube map as float16 (`automatic`, `half`) or float32, atomically: one channel as R, two as RG,
+/// three and four as RGBA. Of three channels the file says that its alpha is to be read as 1 (KTXswizzle
+/// "rgb1"). Values beyond ±65504 are clamped to float16 and counted. Throws InvalidArgument if the map is not
+/// a cube of one to four channels, FileError if the file cannot be written or `format` is another.
 SaveReport save_ktx2(const std::string& path, const EnvMapView& map,
                      PixelFormat format = PixelFormat::automatic);
 
@@ -22,9 +22,9 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map,
 void check_ktx2_path(const std::string& path, const Projection& projection,
                      PixelFormat format = PixelFormat::automatic);
 
-/// Reads a cube map of float16 or float32 with one to four channels and any number of levels, not supercompressed. An
-/// alpha that is to be read as 1 is left out.
-/// Throws FileError for anything else, damaged files and those beyond `limits`.
+/// Reads a cube map of float16 or float32 with one to four channels and any number of levels, not
+/// supercompressed. An alpha that is to be read as 1 is left out. Throws FileError for anything else, damaged
+/// files and those beyond `limits`.
 EnvMap load_ktx2(const std::string& path, const ImageLimits& limits = {});
 
 }  // namespace mirrorbake

@@ -16,9 +16,9 @@ namespace mirrorbake {
 /// the sphere of the source, whose texels are areas of constant radiance: exact for straight texel edges, and
 /// it conserves flux (first-order conservative remapping; Jones, Monthly Weather Review 127, 1999).
 /// `bilinear`: interpolation at the centre of the texel. `nearest`: the texel that its centre lies in.
-/// `automatic`: `area` where a texel covers at least one of the source; the mean of bilinear interpolation over
-/// its area where it is at most three quarters as long (as wide, of long ones around a pole); and a blend in
-/// between. It conserves flux, too, but for what the change from one to the other moves.
+/// `automatic`: `area` where a texel covers at least one of the source; the mean of bilinear interpolation
+/// over its area where it is at most three quarters as long (as wide, of long ones around a pole); and a
+/// blend in between. It conserves flux, too, but for what the change from one to the other moves.
 enum class ResampleFilter { automatic, area, bilinear, nearest };
 
 ResampleFilter parse_resample_filter(std::string_view name);
@@ -31,7 +31,8 @@ struct ResampleOptions {
 /// The finest level of `source` in another projection and size, as a map of one level. What the source does
 /// not cover (a fisheye of less than 360°) is 0. Texels of round maps outside of the unit disc hold what lies
 /// beyond the rim, in angular maps and fisheyes interpolated from two texels on. Same bits on any number of
-/// threads. Throws InvalidArgument for layouts or matrices that are not valid, or of more than 2³² − 1 texels.
+/// threads. Throws InvalidArgument for layouts or matrices that are not valid, or of more than 2³² − 1
+/// texels.
 EnvMap resample(const EnvMapView& source, const Projection& target, int width, int height,
                 const ResampleOptions& options = {});
 

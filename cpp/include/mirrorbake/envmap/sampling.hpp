@@ -10,10 +10,11 @@
 
 namespace mirrorbake {
 
-/// How a map is read (spec E2). `nearest` and `bilinear` read the finest level. `trilinear` interpolates between the two
-/// levels whose texels are next in size to the longer differential, as graphics hardware does. `ewa` is the elliptical
-/// weighted average on two adjacent levels: [WP] "hybrid texture filtering", after Heckbert, Fundamentals of Texture
-/// Mapping and Image Warping, 1989. All but `nearest` read across edges and corners of faces.
+/// How a map is read (spec E2). `nearest` and `bilinear` read the finest level. `trilinear` interpolates
+/// between the two levels whose texels are next in size to the longer differential, as graphics hardware
+/// does. `ewa` is the elliptical weighted average on two adjacent levels: [WP] "hybrid texture filtering",
+/// after Heckbert, Fundamentals of Texture Mapping and Image Warping, 1989. All but `nearest` read across
+/// edges and corners of faces.
 enum class SampleFilter { nearest, bilinear, trilinear, ewa };
 
 SampleFilter parse_sample_filter(std::string_view name);
@@ -23,11 +24,12 @@ struct SampleOptions {
   double max_anisotropy = 16.0;  ///< of `ewa`: longer ellipses are widened to this ratio, ≥ 1
 };
 
-/// Values of the map in many directions of any length > 0: directions.size() × channels numbers. `ddx` and `ddy` are
-/// the differentials of the directions over a pixel, in the directions' own length; `trilinear` and `ewa` need
-/// them, the others take empty spans. Directions that are not finite or zero, or that the map does not cover, give 0;
-/// differentials that are not finite count as infinitely long. Returns the number of directions that were not finite or
-/// zero. Throws InvalidArgument if lengths disagree or the map is not valid.
+/// Values of the map in many directions of any length > 0: directions.size() × channels numbers. `ddx` and
+/// `ddy` are the differentials of the directions over a pixel, in the directions' own length; `trilinear` and
+/// `ewa` need them, the others take empty spans. Directions that are not finite or zero, or that the map does
+/// not cover, give 0; differentials that are not finite count as infinitely long. Returns the number of
+/// directions that were not finite or zero. Throws InvalidArgument if lengths disagree or the map is not
+/// valid.
 std::size_t sample(const EnvMapView& map, std::span<const glm::vec3> directions,
                    std::span<const glm::vec3> ddx, std::span<const glm::vec3> ddy,
                    const SampleOptions& options, std::span<float> values);

@@ -9,8 +9,8 @@
 
 #include "mirrorbake/envmap/cube_pyramid.hpp"
 
-/// How the texels of a map with mip levels lie to each other: all that a solver, a regulariser and a fill have to know of a
-/// map.
+/// How the texels of a map with mip levels lie to each other: all that a solver, a regulariser and a fill
+/// have to know of a map.
 namespace mirrorbake {
 
 enum class TopologyKind { cube, dual_paraboloid, atlas };
@@ -21,9 +21,9 @@ struct TexelPlace {
   int level = 0, face = 0, row = 0, column = 0;
 };
 
-/// Texels are numbered as values are in EnvMapLayout: levels from the finest, in a level the faces, in a face the rows
-/// from the top. All levels down to one texel a face exist. Sides are powers of two, so that every texel but those of
-/// the finest level has its children exactly below it.
+/// Texels are numbered as values are in EnvMapLayout: levels from the finest, in a level the faces, in a face
+/// the rows from the top. All levels down to one texel a face exist. Sides are powers of two, so that every
+/// texel but those of the finest level has its children exactly below it.
 class TexelTopology {
  public:
   /// Faces of size² texels. Throws InvalidArgument unless the size is a power of two from 1 to 16384.
@@ -52,12 +52,13 @@ class TexelTopology {
   }
   TexelPlace place(std::uint32_t texel) const;
 
-  /// The texel at a place whose row or column may lie beyond the face: the one that holds the direction there when the
-  /// projection is continued, on the neighbouring face or hemisphere; of an atlas the edge is repeated.
+  /// The texel at a place whose row or column may lie beyond the face: the one that holds the direction there
+  /// when the projection is continued, on the neighbouring face or hemisphere; of an atlas the edge is
+  /// repeated.
   std::uint32_t texel_at(const TexelPlace& place) const;
 
-  /// Above, below, left, right, so that whoever is a texel's neighbour has it as one; kNoTexel beyond the edges of an atlas
-  /// and of the sheets of a dual paraboloid, which go on beyond the rim.
+  /// Above, below, left, right, so that whoever is a texel's neighbour has it as one; kNoTexel beyond the
+  /// edges of an atlas and of the sheets of a dual paraboloid, which go on beyond the rim.
   std::array<std::uint32_t, 4> neighbours(std::uint32_t texel) const;
   /// kNoTexel on the coarsest level.
   std::uint32_t parent(std::uint32_t texel) const;

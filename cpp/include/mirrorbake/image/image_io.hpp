@@ -8,8 +8,9 @@
 
 #include "mirrorbake/image/image.hpp"
 
-/// Image files: EXR through OpenEXR; WebP through libwebp; HDR by a reader of its own; TIFF, PNG and JPEG, and writing HDR,
-/// through OpenImageIO, in a library that is loaded when it is needed first. None of them is seen outside.
+/// Image files: EXR through OpenEXR; WebP through libwebp; HDR by a reader of its own; TIFF, PNG and JPEG,
+/// and writing HDR, through OpenImageIO, in a library that is loaded when it is needed first. None of them is
+/// seen outside.
 namespace mirrorbake {
 
 /// Bounds of what a reader accepts: files are hostile until read. They are checked before pixels are
@@ -39,18 +40,19 @@ struct ImageChoice {
       layer;  ///< its channels, without its name and the dot before them; empty: all channels of the part
 };
 
-/// Reads a file as scene-linear float32 of Rec. 709 primaries. What kind of file it is follows from its first bytes, not from its
-/// name. Integer formats are decoded from sRGB unless the file says that it is linear; alpha is left alone,
-/// colour is multiplied by it (premultiplied, as EXR has it). The image is the display window: what a cropped
-/// data window leaves out is 0, and it is upright, whatever order of rows and columns the file states. Of a file with several
-/// images one is read, of EXR the chosen one. EXR's chromaticities, and EXPOSURE and XYZE of HDR, are applied; its integer
-/// channels (ids) keep their values. Channel names are valid UTF-8. Throws FileError if it is missing, not an image, truncated, beyond `limits`, or claims more than its bytes can
-/// hold; TIFF, PNG and JPEG also if the library that reads them cannot be loaded.
+/// Reads a file as scene-linear float32 of Rec. 709 primaries. What kind of file it is follows from its first
+/// bytes, not from its name. Integer formats are decoded from sRGB unless the file says that it is linear;
+/// alpha is left alone, colour is multiplied by it (premultiplied, as EXR has it). The image is the display
+/// window: what a cropped data window leaves out is 0, and it is upright, whatever order of rows and columns
+/// the file states. Of a file with several images one is read, of EXR the chosen one. EXR's chromaticities,
+/// and EXPOSURE and XYZE of HDR, are applied; its integer channels (ids) keep their values. Channel names are
+/// valid UTF-8. Throws FileError if it is missing, not an image, truncated, beyond `limits`, or claims more
+/// than its bytes can hold; TIFF, PNG and JPEG also if the library that reads them cannot be loaded.
 Image load_image(const std::string& path, const ImageLimits& limits = {}, const ImageChoice& choice = {});
 
-/// The colours of an image: what is left of it to shine. Channels R, G, B, or Y alone; of an image with none of its own the
-/// only layer that has them. Depth, alpha and others are left out. Throws FileError(name) if there are none, or several
-/// layers that have them.
+/// The colours of an image: what is left of it to shine. Channels R, G, B, or Y alone; of an image with none
+/// of its own the only layer that has them. Depth, alpha and others are left out. Throws FileError(name) if
+/// there are none, or several layers that have them.
 Image colours_of(const std::string& name, Image image);
 
 struct ImageSize {
@@ -66,8 +68,8 @@ ImageSize read_image_size(const std::string& path, const ImageLimits& limits = {
 /// Whether integers are decoded from sRGB: as load_image does, always (floats too), or never.
 enum class Transfer { automatic, srgb, linear };
 
-/// What becomes of an alpha channel: the colour is multiplied by it, as load_image does; it is dropped and the colour
-/// left as it is stored; or it alone is kept. Images without one stay as they are.
+/// What becomes of an alpha channel: the colour is multiplied by it, as load_image does; it is dropped and
+/// the colour left as it is stored; or it alone is kept. Images without one stay as they are.
 enum class AlphaUse { multiply, drop, only };
 
 struct DecodeOptions {
@@ -77,23 +79,24 @@ struct DecodeOptions {
   AlphaUse alpha = AlphaUse::multiply;
 };
 
-/// Decodes an image file that is in memory; `name` stands for its path in errors. As load_image, and FileError also if
-/// the image claims to be larger than its format can compress into so few bytes.
+/// Decodes an image file that is in memory; `name` stands for its path in errors. As load_image, and
+/// FileError also if the image claims to be larger than its format can compress into so few bytes.
 Image decode_image(const std::string& name, std::span<const unsigned char> bytes,
                    const DecodeOptions& options = {});
 
 /// Whether the extension of `path` names a format that save_image writes.
 bool has_image_extension(const std::string& path);
 
-/// What save_image would refuse whatever the image is: throws FileError if the extension of `path` names no format or one
-/// that cannot store `format`, if `path` is empty or a folder, or its folder does not exist. Nothing is written.
+/// What save_image would refuse whatever the image is: throws FileError if the extension of `path` names no
+/// format or one that cannot store `format`, if `path` is empty or a folder, or its folder does not exist.
+/// Nothing is written.
 void check_image_path(const std::string& path, PixelFormat format = PixelFormat::automatic);
 
 /// Writes atomically: a temporary file beside `path`, renamed when it is complete. The extension decides the
 /// format. EXR and TIFF hold any channels; PNG one to four, of which an even number must end with "A"; JPEG
-/// one or three; HDR three, rounded to the nearest that its 8 bits hold. Integer formats are encoded to sRGB after clipping to [0,1], alpha unassociated.
-/// Throws FileError if the file cannot be written or its kind cannot hold the image, InvalidArgument if the
-/// image is empty or its parts disagree.
+/// one or three; HDR three, rounded to the nearest that its 8 bits hold. Integer formats are encoded to sRGB
+/// after clipping to [0,1], alpha unassociated. Throws FileError if the file cannot be written or its kind
+/// cannot hold the image, InvalidArgument if the image is empty or its parts disagree.
 SaveReport save_image(const std::string& path, const Image& image,
                       PixelFormat format = PixelFormat::automatic);
 
@@ -101,8 +104,8 @@ SaveReport save_image(const std::string& path, const Image& image,
 SaveReport save_image(const std::string& path, int width, int height, std::span<const std::string> channels,
                       std::span<const float> pixels, PixelFormat format = PixelFormat::automatic);
 
-/// Lets EXR files be packed on so many threads of OpenEXR's, 0 to 1024; none until it is called. They are one pool for the
-/// whole process and do not survive fork(): a program's choice. Throws InvalidArgument.
+/// Lets EXR files be packed on so many threads of OpenEXR's, 0 to 1024; none until it is called. They are one
+/// pool for the whole process and do not survive fork(): a program's choice. Throws InvalidArgument.
 void set_exr_threads(int threads);
 
 /// Names of 1 to 4 channels: Y; Y, A; R, G, B; R, G, B, A. Throws InvalidArgument for any other count.

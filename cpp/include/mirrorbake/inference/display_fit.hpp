@@ -9,8 +9,9 @@
 #include "mirrorbake/proxy/proxy.hpp"
 #include "mirrorbake/surface/run_time_model.hpp"
 
-/// The joint display fit: maps of all shells and parts, of one or several nodes, inferred together from the pixels that a
-/// renderer will show. [PEM] §4 infers every layer by itself, and so spends texels on what no pixel shows.
+/// The joint display fit: maps of all shells and parts, of one or several nodes, inferred together from the
+/// pixels that a renderer will show. [PEM] §4 infers every layer by itself, and so spends texels on what no
+/// pixel shows.
 namespace mirrorbake {
 
 /// A shell as a part sees it. Several parts may share a map.
@@ -21,8 +22,8 @@ struct FitShell {
       {};  ///< 0 for those that the shell leaves out; empty: it covers all
 };
 
-/// Front to back, in the order of the traced shells; the last is opaque, and holds what arrives from its own and all further
-/// traced shells.
+/// Front to back, in the order of the traced shells; the last is opaque, and holds what arrives from its own
+/// and all further traced shells.
 using FitPart = std::vector<FitShell>;
 
 /// A traced view, as the run time will look up its maps.
@@ -50,13 +51,14 @@ struct DisplayFit {
   std::vector<SolveReport> passes;  ///< of the joint fit
 };
 
-/// Row of a pixel: mean over its lookups of F · transmittance · reads, the transmittance Π(1 − α) of the shells in front by
-/// the α of the layers' own fit; target: the traced pixel less its diffuse light; weight: coverage times the squared
-/// derivative of the display's curve (sRGB) at the model's own image, since at a noisy target it would prefer what came out
-/// dark. Beside them, weighted by μ, the rows of every layer by itself. `prior`: empty, or nodes × texels × 3.
+/// Row of a pixel: mean over its lookups of F · transmittance · reads, the transmittance Π(1 − α) of the
+/// shells in front by the α of the layers' own fit; target: the traced pixel less its diffuse light; weight:
+/// coverage times the squared derivative of the display's curve (sRGB) at the model's own image, since at a
+/// noisy target it would prefer what came out dark. Beside them, weighted by μ, the rows of every layer by
+/// itself. `prior`: empty, or nodes × texels × 3.
 ///
-/// F enters per channel: a row's weights follow the mean of its channels, each channel's scale its own, which is exact where
-/// F has one hue within a pixel.
+/// F enters per channel: a row's weights follow the mean of its channels, each channel's scale its own, which
+/// is exact where F has one hue within a pixel.
 ///
 /// Throws InvalidArgument for parts, maps, images or options that do not fit together.
 DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPart> parts,

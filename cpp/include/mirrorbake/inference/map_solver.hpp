@@ -9,11 +9,13 @@
 #include "mirrorbake/envmap/texel_topology.hpp"
 #include "mirrorbake/inference/rendering_matrix.hpp"
 
-/// Inference of environment maps: regularised least squares on rendering matrices ([PEM] §4; spec I2, I3, I4).
+/// Inference of environment maps: regularised least squares on rendering matrices ([PEM] §4; spec I2, I3,
+/// I4).
 namespace mirrorbake {
 
-/// The weights λ are relative to the rows: multiplied with Σ w (A 1)² over rows and divided by the number of unknowns, per
-/// channel. So they mean the same at any size of image and map, and at any brightness of the reflector.
+/// The weights λ are relative to the rows: multiplied with Σ w (A 1)² over rows and divided by the number of
+/// unknowns, per channel. So they mean the same at any size of image and map, and at any brightness of the
+/// reflector.
 struct SolveOptions {
   float smoothness = 1e-3F;  ///< λ of squared differences between neighbouring texels of one level, ≥ 0
   float level_agreement = 1e-3F;  ///< λ of a texel's squared difference from the mean of its children, ≥ 0
@@ -38,8 +40,9 @@ struct NodeWeight {
   float weight = 1.0F;
 };
 
-/// A view of maps that are blended from those of several nodes: it sees b = A Σₖ weightₖ xₖ. One node of weight 1 is the
-/// ordinary case; several views of one node are solved jointly for one map (spec I4). `matrix` has to outlive the solver.
+/// A view of maps that are blended from those of several nodes: it sees b = A Σₖ weightₖ xₖ. One node of
+/// weight 1 is the ordinary case; several views of one node are solved jointly for one map (spec I4).
+/// `matrix` has to outlive the solver.
 struct SolverView {
   const RenderingMatrix* matrix = nullptr;
   std::vector<NodeWeight> nodes = {{}};
@@ -54,8 +57,8 @@ struct ViewTarget {
 struct SolveProblem {
   int channels = 3;  ///< 1…4
   std::span<const ViewTarget> views;
-  /// Empty, or nodes × texels × channels: with a prior the regulariser acts on the difference from it (spec I2b); without
-  /// an initial map, back-projection starts.
+  /// Empty, or nodes × texels × channels: with a prior the regulariser acts on the difference from it (spec
+  /// I2b); without an initial map, back-projection starts.
   std::span<const float> prior = {};
   std::span<const float> initial = {};
   /// Of each channel; all are ≥ 0. The default is radiance in the first three and coverage in the fourth.
@@ -69,25 +72,27 @@ struct MapSolution {
   SolveReport report;
 };
 
-/// Solves min_x Σ_v Σ_r w_r |A_v,r Σₖ b_k xₖ − t_v,r|² + regulariser, within the bounds, for the maps xₖ of all nodes
-/// together; the maps of a node are stacked, as the matrix's columns are. The constructor does what all solves share: it
-/// numbers the texels that are seen, transposes the matrices and builds the regulariser's stencil.
+/// Solves min_x Σ_v Σ_r w_r |A_v,r Σₖ b_k xₖ − t_v,r|² + regulariser, within the bounds, for the maps xₖ of
+/// all nodes together; the maps of a node are stacked, as the matrix's columns are. The constructor does what
+/// all solves share: it numbers the texels that are seen, transposes the matrices and builds the
+/// regulariser's stencil.
 ///
-/// The unknowns are the seen texels of all levels, solved for with conjugate gradients on the least-squares problem
-/// (CGLS, preconditioned with the diagonal), all channels at once. Unseen texels are filled from seen ones across
-/// levels (pull-push); with a prior, they fall back to it with growing distance. Same bits on any number of threads.
+/// The unknowns are the seen texels of all levels, solved for with conjugate gradients on the least-squares
+/// problem (CGLS, preconditioned with the diagonal), all channels at once. Unseen texels are filled from seen
+/// ones across levels (pull-push); with a prior, they fall back to it with growing distance. Same bits on any
+/// number of threads.
 class MapSolver {
  public:
-  /// Throws InvalidArgument if a matrix has other columns than the maps have texels, a node's number or weight or an option
-  /// is out of range.
+  /// Throws InvalidArgument if a matrix has other columns than the maps have texels, a node's number or
+  /// weight or an option is out of range.
   MapSolver(std::span<const SolverView> views, std::span<const TexelTopology> maps, int nodes,
             const SolveOptions& options);
   ~MapSolver();
   MapSolver(MapSolver&&) noexcept;
   MapSolver& operator=(MapSolver&&) noexcept;
 
-  /// Throws InvalidArgument for wrong lengths, for values that are not finite or beyond 1e15, with their count, and
-  /// NumericalError if conjugate gradients leave the numbers.
+  /// Throws InvalidArgument for wrong lengths, for values that are not finite or beyond 1e15, with their
+  /// count, and NumericalError if conjugate gradients leave the numbers.
   MapSolution solve(const SolveProblem& problem) const;
 
   struct State;  ///< of the implementation

@@ -11,16 +11,17 @@
 
 namespace mirrorbake {
 
-/// What maps should make a view look like: sums over traced samples, pixel by pixel, so that a view of many samples never has
-/// to be in memory at once.
+/// What maps should make a view look like: sums over traced samples, pixel by pixel, so that a view of many
+/// samples never has to be in memory at once.
 class ViewTargets {
  public:
-  /// Of an image of width × height pixels, a reflector of `parts` parts, and as many shells as the samples will have.
-  /// Throws InvalidArgument for a number below 1.
+  /// Of an image of width × height pixels, a reflector of `parts` parts, and as many shells as the samples
+  /// will have. Throws InvalidArgument for a number below 1.
   ViewTargets(int width, int height, int parts, int shells);
 
-  /// Adds samples with traced light, at most one trace of every pixel. (x, y): where their image's top left pixel lies in this one. Throws InvalidArgument
-  /// if they do not fit, have no light, or light that is not finite.
+  /// Adds samples with traced light, at most one trace of every pixel. (x, y): where their image's top left
+  /// pixel lies in this one. Throws InvalidArgument if they do not fit, have no light, or light that is not
+  /// finite.
   void add(const SurfaceSamples& samples, int x = 0, int y = 0);
 
   int width() const { return width_; }

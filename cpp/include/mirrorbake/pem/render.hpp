@@ -22,22 +22,24 @@ struct ShellMap {
   TexelTopology topology;
   /// texels × 4, premultiplied RGBA, or texels × 3, which is opaque: nothing behind it shows.
   std::span<const float> texels;
-  /// One entry per triangle of the reflector: 0 for those that the shell leaves out, since they lie on the convex hull
-  /// and cannot reflect what it holds ([PEM] §4, spec G5). Empty: it covers all.
+  /// One entry per triangle of the reflector: 0 for those that the shell leaves out, since they lie on the
+  /// convex hull and cannot reflect what it holds ([PEM] §4, spec G5). Empty: it covers all.
   std::span<const std::uint8_t> triangles = {};
 };
 
 /// Front to back.
 using PartShells = std::vector<ShellMap>;
 
-/// Composites `(L₀ + (1 − α₀)(L₁ + …)) F + D` for every sample and averages over the pixel. `parts[p]` belongs to part p of
-/// the samples, which lie where `model` looks up; `diffuse` holds D of every sample or is empty (black). Channels R, G,
-/// B, A: light from the reflector times coverage, and coverage, so that an image over another is
-/// `RGB + (1−A) · background`. Throws InvalidArgument when a part or a length does not fit.
+/// Composites `(L₀ + (1 − α₀)(L₁ + …)) F + D` for every sample and averages over the pixel. `parts[p]`
+/// belongs to part p of the samples, which lie where `model` looks up; `diffuse` holds D of every sample or
+/// is empty (black). Channels R, G, B, A: light from the reflector times coverage, and coverage, so that an
+/// image over another is `RGB + (1−A) · background`. Throws InvalidArgument when a part or a length does not
+/// fit.
 Image render_reflector(const SurfaceSamples& samples, std::span<const PartShells> parts,
                        std::span<const glm::vec3> diffuse, const RunTimeModel& model = reference_run_time());
 
-/// D of every sample from irradiance baked per vertex: albedo/π times the irradiance interpolated over the triangle.
+/// D of every sample from irradiance baked per vertex: albedo/π times the irradiance interpolated over the
+/// triangle.
 std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
                                                std::span<const glm::uvec3> triangles,
                                                std::span<const glm::vec3> vertex_irradiance);

@@ -4,22 +4,22 @@
 
 #include "mirrorbake/projection/projection.hpp"
 
-/// Radially symmetric lobes (spec B1–B3): weights of light that arrives at an angle γ from the direction of a texel.
+/// Radially symmetric lobes (spec B1–B3): weights of light that arrives at an angle γ from the direction of a
+/// texel.
 namespace mirrorbake {
 
-/// `lambert`: max(0, cos γ), of irradiance ([EMT] eq. 15, [AEM] eq. 4).
-/// `phong`: max(0, cos γ)^exponent ([EMT] eq. 17, [AEM] eq. 7).
-/// `ggx`: D(h) max(0, cos γ) for a viewer along the normal, the first of the two sums of Karis, "Real Shading in Unreal
-/// Engine 4", 2013: D by Walter et al., EGSR 2007 eq. 33, h half-way to the light.
-/// `table`: any.
+/// `lambert`: max(0, cos γ), of irradiance ([EMT] eq. 15, [AEM] eq. 4). `phong`: max(0, cos γ)^exponent
+/// ([EMT] eq. 17, [AEM] eq. 7). `ggx`: D(h) max(0, cos γ) for a viewer along the normal, the first of the two
+/// sums of Karis, "Real Shading in Unreal Engine 4", 2013: D by Walter et al., EGSR 2007 eq. 33, h half-way
+/// to the light. `table`: any.
 enum class LobeKind { lambert, phong, ggx, table };
 
 struct Lobe {
   LobeKind kind = LobeKind::lambert;
   double exponent = 1.0;  ///< of `phong`, 1…1e6; infinite: the mirror
   double alpha = 1.0;     ///< of `ggx`, 0.01…1, the square of what renderers call roughness; 0: the mirror
-  /// Of `table`: weights ≥ 0 at equal steps of γ from 0 to `table_angle`, interpolated by monotone cubics (Fritsch and
-  /// Carlson, SIAM J. Numer. Anal. 17, 1980) that are flat at 0; none beyond.
+  /// Of `table`: weights ≥ 0 at equal steps of γ from 0 to `table_angle`, interpolated by monotone cubics
+  /// (Fritsch and Carlson, SIAM J. Numer. Anal. 17, 1980) that are flat at 0; none beyond.
   std::vector<double> table = {};
   double table_angle = 180.0;  ///< degrees, above 0 and up to 180
 };
@@ -33,10 +33,12 @@ bool is_mirror(const Lobe& lobe);
 /// The weight at an angle with this cosine; D without its factor 1/(π α²), so that it is 1 at γ = 0.
 double lobe_weight(const Lobe& lobe, double cosine);
 
-/// ∫ weight dω over the sphere, to a relative 1e-7 if the weight has no step; of Phong 2π/(exponent + 1). A mirror's is 0.
+/// ∫ weight dω over the sphere, to a relative 1e-7 if the weight has no step; of Phong 2π/(exponent + 1). A
+/// mirror's is 0.
 double lobe_integral(const Lobe& lobe);
 
-/// α of the microfacets whose highlight is as wide as Phong's: √(2/(exponent + 2)) (Walter et al., after eq. 31).
+/// α of the microfacets whose highlight is as wide as Phong's: √(2/(exponent + 2)) (Walter et al., after eq.
+/// 31).
 double alpha_from_exponent(double exponent);
 double exponent_from_alpha(double alpha);
 

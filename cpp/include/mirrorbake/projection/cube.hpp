@@ -23,11 +23,12 @@ struct CubeCoordinates {
   float t = 0.5F;  ///< [0,1], top to bottom
 };
 
-/// Face and position of a direction of any finite length > 0. On an edge the first of x, y, z that is largest wins.
-/// NaN, infinite and zero directions give face 0, s = t = ½: never an index out of range.
+/// Face and position of a direction of any finite length > 0. On an edge the first of x, y, z that is largest
+/// wins. NaN, infinite and zero directions give face 0, s = t = ½: never an index out of range.
 CubeCoordinates cube_from_direction(glm::vec3 direction);
 
-/// Direction through (s, t) of a face, its largest component ±1, not normalised. (s, t) may lie outside [0,1].
+/// Direction through (s, t) of a face, its largest component ±1, not normalised. (s, t) may lie outside
+/// [0,1].
 glm::vec3 direction_from_cube(int face, float s, float t);
 
 /// Solid angle in steradians of texel (column, row) of a face of `size`² texels, relative error ≤ 1e-12.

@@ -4,8 +4,8 @@
 
 namespace mirrorbake {
 
-/// A position in a map. x runs to the right and y up, both from the centre of the face, in [−1,1]: counted from the
-/// centre they keep a bit more than in [0,1], which a float32 round trip within 2e-7 rad needs.
+/// A position in a map. x runs to the right and y up, both from the centre of the face, in [−1,1]: counted
+/// from the centre they keep a bit more than in [0,1], which a float32 round trip within 2e-7 rad needs.
 struct MapPoint {
   int face = 0;
   double x = 0.0;

@@ -13,7 +13,8 @@
 
 #include "mirrorbake/projection/map_point.hpp"
 
-/// All projections behind one interface (spec P1–P6). Computed in double; the batch functions read and write float32.
+/// All projections behind one interface (spec P1–P6). Computed in double; the batch functions read and write
+/// float32.
 namespace mirrorbake {
 
 enum class ProjectionKind { cube, dual_paraboloid, sphere_map, latlong, angular, fisheye };
@@ -40,8 +41,9 @@ int natural_aspect(const Projection& projection);
 
 MapPoint point_from_direction(const Projection& projection, glm::dvec3 direction);
 
-/// Position of a usable direction in the plane of a given face, which may lie outside of the face, so that what
-/// straddles an edge can be followed beyond it. Cube: behind the face there is none. Fisheye: not clamped to the rim.
+/// Position of a usable direction in the plane of a given face, which may lie outside of the face, so that
+/// what straddles an edge can be followed beyond it. Cube: behind the face there is none. Fisheye: not
+/// clamped to the rim.
 std::optional<glm::dvec2> point_on_face(const Projection& projection, int face, glm::dvec3 direction);
 
 /// Unit direction. (x, y) may lie outside of the face, see the single projections. `face` must exist.
@@ -49,16 +51,17 @@ glm::dvec3 direction_from_point(const Projection& projection, int face, double x
 
 MapJacobian map_jacobian(const Projection& projection, int face, double x, double y);
 
-/// Solid angle per unit of area of (x, y), |∂d/∂x × ∂d/∂y|, in steradians. A face has an area of 4, of which round
-/// maps use the unit disc.
+/// Solid angle per unit of area of (x, y), |∂d/∂x × ∂d/∂y|, in steradians. A face has an area of 4, of which
+/// round maps use the unit disc.
 double solid_angle_density(const Projection& projection, int face, double x, double y);
 
-/// Solid angle in steradians of a texel of a face of width × height texels, the part within the domain of the face
-/// (the unit disc for round maps): all faces together have 4π, a fisheye 2π(1 − cos(½ field of view)). Exact
-/// to a relative 1e-12; texels cut by the rim to an absolute 1e-14. Faces are alike.
+/// Solid angle in steradians of a texel of a face of width × height texels, the part within the domain of the
+/// face (the unit disc for round maps): all faces together have 4π, a fisheye 2π(1 − cos(½ field of view)).
+/// Exact to a relative 1e-12; texels cut by the rim to an absolute 1e-14. Faces are alike.
 double texel_solid_angle(const Projection& projection, int width, int height, int column, int row);
 
-/// The solid angles of all texels of one face, height × width. Throws InvalidArgument for sizes outside 1…65536.
+/// The solid angles of all texels of one face, height × width. Throws InvalidArgument for sizes outside
+/// 1…65536.
 std::vector<double> texel_solid_angles(const Projection& projection, int width, int height);
 
 /// Column or row in [0, count) of a coordinate in [−1,1] from the left or the top; outside it is clamped.
@@ -78,7 +81,8 @@ std::size_t points_from_directions(const Projection& projection, std::span<const
                                    std::span<std::int32_t> faces, std::span<glm::vec2> points,
                                    std::size_t* not_covered = nullptr);
 
-/// Unit directions of many points. Throws InvalidArgument for a face that does not exist or a point that is not finite.
+/// Unit directions of many points. Throws InvalidArgument for a face that does not exist or a point that is
+/// not finite.
 void directions_from_points(const Projection& projection, std::span<const std::int32_t> faces,
                             std::span<const glm::vec2> points, std::span<glm::vec3> directions);
 

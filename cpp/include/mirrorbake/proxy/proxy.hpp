@@ -8,10 +8,10 @@
 /// Proxy geometry: the shape on which an environment map lies (spec §4, [PEM] §4 "EM Representations").
 ///
 /// A lookup follows a ray from a position to the point h where it leaves the proxy and reads the map in the
-/// direction h − origin. Coordinates are float, the arithmetic is double: a float kernel loses one to three digits
-/// near walls and in flat shapes (1:1e4), where h − origin is a short difference of long vectors. For finite
-/// input whose absolute values are below 1e30 the answer is never NaN, and for positions inside it is within 1e-6 rad
-/// of the exact one.
+/// direction h − origin. Coordinates are float, the arithmetic is double: a float kernel loses one to three
+/// digits near walls and in flat shapes (1:1e4), where h − origin is a short difference of long vectors. For
+/// finite input whose absolute values are below 1e30 the answer is never NaN, and for positions inside it is
+/// within 1e-6 rad of the exact one.
 ///
 /// Outside of the proxy (a vertex that pokes through the table on which a box stands, say) the answer is
 /// defined so that it is exact wherever the ray passes through the proxy, and changes continuously as the
@@ -66,13 +66,14 @@ struct Proxy {
 /// `position`.
 glm::vec3 lookup_direction(const Proxy& proxy, glm::vec3 position, glm::vec3 direction);
 
-/// The same with float64 coordinates; the direction's length is 0 or from 1e-100 to 1e100, whose square and products
-/// are still numbers.
+/// The same with float64 coordinates; the direction's length is 0 or from 1e-100 to 1e100, whose square and
+/// products are still numbers.
 glm::dvec3 lookup_direction(const Proxy& proxy, glm::dvec3 position, glm::dvec3 direction);
 
-/// The same for many rays, in parallel and vectorised, with the same bits as one at a time. `lookups` may be the same
-/// memory as `positions` or `directions`, but not overlap partly. Throws InvalidArgument if the spans differ in
-/// length, or naming the first row with a NaN or infinite component; `lookups` is then unspecified.
+/// The same for many rays, in parallel and vectorised, with the same bits as one at a time. `lookups` may be
+/// the same memory as `positions` or `directions`, but not overlap partly. Throws InvalidArgument if the
+/// spans differ in length, or naming the first row with a NaN or infinite component; `lookups` is then
+/// unspecified.
 void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
                        std::span<const glm::vec3> directions, std::span<glm::vec3> lookups);
 
@@ -81,10 +82,10 @@ void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions
                        std::span<const glm::dvec3> directions, std::span<glm::dvec3> lookups);
 
 /// Texture coordinates of a mirror's vertices or pixels for one or more layers ([PEM] §4): lookups along the
-/// reflections, about the `normals` (any length > 0), of rays from `eye` to the `positions`. `lookups` holds those in
-/// the first proxy, then those in the second, …: proxies.size() · positions.size() elements. Memory and errors as for
-/// lookup_directions, except that the lookups of several proxies may not replace an input; `eye` has to be finite too,
-/// and `proxies` not empty.
+/// reflections, about the `normals` (any length > 0), of rays from `eye` to the `positions`. `lookups` holds
+/// those in the first proxy, then those in the second, …: proxies.size() · positions.size() elements. Memory
+/// and errors as for lookup_directions, except that the lookups of several proxies may not replace an input;
+/// `eye` has to be finite too, and `proxies` not empty.
 void mirror_lookups(std::span<const Proxy> proxies, glm::vec3 eye, std::span<const glm::vec3> positions,
                     std::span<const glm::vec3> normals, std::span<glm::vec3> lookups);
 

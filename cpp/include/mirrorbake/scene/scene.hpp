@@ -29,7 +29,8 @@ struct TriangleMesh {
 /// Texels that materials refer to: in memory, or in a file.
 struct Texture {
   Image
-      image;  ///< one channel, which stands for all three, or R, G, B; scene-linear; unused if there is a file
+      /// one channel, which stands for all three, or R, G, B; scene-linear; unused if there is a file
+      image;
   TextureWrap wrap_u = TextureWrap::repeat;
   TextureWrap wrap_v = TextureWrap::repeat;
   std::shared_ptr<const TextureFile> file = nullptr;
@@ -49,16 +50,16 @@ struct TextureReference {
 /// The coordinates, v up, at which a texture is looked up for a mesh's coordinates `uv`, v up.
 glm::vec2 texture_coordinates(const TextureReference& reference, glm::vec2 uv);
 
-/// Texels around a point, interpolated bilinearly; `uv`, v up, are the texture's own coordinates. Throws FileError if the
-/// texture's file has changed since it was opened.
+/// Texels around a point, interpolated bilinearly; `uv`, v up, are the texture's own coordinates. Throws
+/// FileError if the texture's file has changed since it was opened.
 glm::vec3 texture_lookup(const Texture& texture, glm::vec2 uv);
 
 /// Mean of all texels.
 glm::vec3 texture_mean(const Texture& texture);
 
-/// Shape of the specular lobe about the mirror direction: a perfect mirror; microfacets with normals distributed
-/// after Trowbridge and Reitz (GGX; Walter et al., "Microfacet models for refraction through rough surfaces", EGSR
-/// 2007); or (r·l)^N, normalised ([EMT] eq. 17).
+/// Shape of the specular lobe about the mirror direction: a perfect mirror; microfacets with normals
+/// distributed after Trowbridge and Reitz (GGX; Walter et al., "Microfacet models for refraction through
+/// rough surfaces", EGSR 2007); or (r·l)^N, normalised ([EMT] eq. 17).
 enum class SpecularLobe { mirror, ggx, phong };
 
 /// How diffuse and specular light add up ([EMT] §3; spec F5): `additive` is F·L_m + L_d, `coated` is
@@ -83,8 +84,8 @@ struct Material {
   TextureReference opacity_texture;   ///< its first channel multiplies `opacity`; its texels are in memory
   std::optional<float>
       opacity_cutoff;  ///< all is there where the opacity is at least this, nothing elsewhere
-  /// Bends the shading normal as glTF 2.0 §3.9.3 has it: texels (x, y, z)/2 + 1/2 in the frame of ∂p/∂u, ∂p/∂v, both of the
-  /// mesh's coordinates with v up, and the normal.
+  /// Bends the shading normal as glTF 2.0 §3.9.3 has it: texels (x, y, z)/2 + 1/2 in the frame of ∂p/∂u,
+  /// ∂p/∂v, both of the mesh's coordinates with v up, and the normal.
   TextureReference normal_texture;
   float normal_scale = 1.0F;             ///< of the texels' x and y
   bool colors_tint_reflectance = false;  ///< the mesh's colours multiply fresnel.r0, too: of a metal
@@ -142,8 +143,8 @@ struct DirectionalLight {
   glm::vec3 irradiance{1.0F};              ///< of a surface that faces it, W m⁻²
 };
 
-/// A point that shines into a cone. Angles are measured from its axis: the intensity is full up to `inner_degrees`
-/// and falls to 0 at `outer_degrees`, between them as KHR_lights_punctual has it.
+/// A point that shines into a cone. Angles are measured from its axis: the intensity is full up to
+/// `inner_degrees` and falls to 0 at `outer_degrees`, between them as KHR_lights_punctual has it.
 struct SpotLight {
   glm::vec3 position{0.0F};
   glm::vec3 direction{0.0F, -1.0F, 0.0F};  ///< unit, the axis, the way the light travels
@@ -152,8 +153,8 @@ struct SpotLight {
   float outer_degrees = 45.0F;             ///< in (0, 90]
 };
 
-/// The part of a spot light's intensity that it sends at an angle to its axis, in [0,1]. `cosine` is that angle's.
-/// The square of a ramp over the cosine, from KHR_lights_punctual, "Inner and Outer Cone Angles".
+/// The part of a spot light's intensity that it sends at an angle to its axis, in [0,1]. `cosine` is that
+/// angle's. The square of a ramp over the cosine, from KHR_lights_punctual, "Inner and Outer Cone Angles".
 float spot_falloff(const SpotLight& light, float cosine);
 
 /// Radiance from infinity, a latitude-longitude panorama: its centre looks along −Z, +X is to the right of
@@ -182,14 +183,16 @@ glm::vec3 texture_lookup(const Scene& scene, const TextureReference& reference, 
 /// Whether rays pass through some of the surface.
 bool has_gaps(const Material& material);
 
-/// The part of a surface that is there for a mesh's coordinates `uv`, v up: 0 or 1 if the material has a cutoff.
+/// The part of a surface that is there for a mesh's coordinates `uv`, v up: 0 or 1 if the material has a
+/// cutoff.
 float opacity_at(const Scene& scene, const Material& material, glm::vec2 uv);
 
 /// Throws InvalidArgument if anything in the scene is unusable: indices out of range, arrays of unequal
 /// length, vertices that are not finite or beyond ±1e12, normals that are not unit vectors, a mesh without
-/// area (single triangles may be degenerate), albedo, texels or reflectance outside [0,1], a lobe's roughness or
-/// exponent out of range, negative radiance, directions of lights that are not unit vectors, cones out of order.
-/// The message names the object, material, texture or light, the field, its value and what was expected.
+/// area (single triangles may be degenerate), albedo, texels or reflectance outside [0,1], a lobe's roughness
+/// or exponent out of range, negative radiance, directions of lights that are not unit vectors, cones out of
+/// order. The message names the object, material, texture or light, the field, its value and what was
+/// expected.
 void validate(const Scene& scene);
 
 /// The same for one mesh.

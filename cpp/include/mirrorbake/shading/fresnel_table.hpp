@@ -7,7 +7,8 @@
 
 #include "mirrorbake/shading/fresnel.hpp"
 
-/// Reflectance as a one-dimensional table with linear interpolation (spec F4), as [PEM] §5 keeps it in a texture.
+/// Reflectance as a one-dimensional table with linear interpolation (spec F4), as [PEM] §5 keeps it in a
+/// texture.
 namespace mirrorbake {
 
 /// Reflectance at c = 0, 1/(size − 1), …, 1.
@@ -25,9 +26,9 @@ ReflectanceFunction reflectance_function(const Fresnel& fresnel, int channel);
 /// Table of `size` entries. Throws InvalidArgument unless size is in [2, 65536] and all values are in [0,1].
 FresnelTable make_table(const ReflectanceFunction& reflectance, std::size_t size);
 
-/// The smallest table (to the last entry, where the error falls with the size) whose error is at most `max_error`,
-/// from 1e-6 to 1. Throws InvalidArgument outside that, NumericalError if 65536 entries do not do: total internal
-/// reflection starts with a vertical tangent that no such table follows closely.
+/// The smallest table (to the last entry, where the error falls with the size) whose error is at most
+/// `max_error`, from 1e-6 to 1. Throws InvalidArgument outside that, NumericalError if 65536 entries do not
+/// do: total internal reflection starts with a vertical tangent that no such table follows closely.
 FresnelTable table_for_error(const ReflectanceFunction& reflectance, double max_error);
 
 /// Interpolated values; `c` and errors as in fresnel.hpp.

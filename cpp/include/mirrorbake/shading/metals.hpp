@@ -7,7 +7,8 @@
 
 #include "mirrorbake/shading/fresnel.hpp"
 
-/// Metals from measured optical constants: spectra, their colour, and the models of fresnel.hpp closest to it.
+/// Metals from measured optical constants: spectra, their colour, and the models of fresnel.hpp closest to
+/// it.
 namespace mirrorbake {
 
 enum class Metal { aluminium, silver, gold, copper, chromium, titanium };
@@ -21,7 +22,8 @@ Metal parse_metal(std::string_view name);
 /// All metals, in the order of the enum.
 std::span<const Metal> all_metals();
 
-/// Measured complex refractive index η + ik in air at rising wavelengths that enclose 380 to 780 nm; linear between.
+/// Measured complex refractive index η + ik in air at rising wavelengths that enclose 380 to 780 nm; linear
+/// between.
 struct OpticalConstants {
   struct Entry {
     double wavelength;  ///< nm
@@ -37,9 +39,9 @@ OpticalConstants optical_constants(Metal metal);
 /// Light in which a colour is seen: CIE standard illuminant D65 or the equal-energy illuminant E.
 enum class Illuminant { d65, e };
 
-/// Reflectance at cosine `c` as linear Rec.709: R, G, B of the reflected light over those of the light itself, CIE 1931
-/// 2° observer, 380 to 780 nm in steps of 5 nm. A mirror of reflectance 1 is (1, 1, 1) under either illuminant. A
-/// saturated metal may leave the gamut: gold's red is 1.04.
+/// Reflectance at cosine `c` as linear Rec.709: R, G, B of the reflected light over those of the light
+/// itself, CIE 1931 2° observer, 380 to 780 nm in steps of 5 nm. A mirror of reflectance 1 is (1, 1, 1) under
+/// either illuminant. A saturated metal may leave the gamut: gold's red is 1.04.
 glm::dvec3 metal_reflectance(Metal metal, double c, Illuminant illuminant = Illuminant::d65);
 
 /// Models of three channels that stand for the spectral curve, each with its largest deviation from

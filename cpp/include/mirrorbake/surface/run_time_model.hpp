@@ -8,15 +8,16 @@
 
 #include "mirrorbake/envmap/reads.hpp"
 
-/// How the renderer that will draw the maps reads them. A map is inferred for one run time: drawn by another it can be
-/// worse than a map that was merely captured.
+/// How the renderer that will draw the maps reads them. A map is inferred for one run time: drawn by another
+/// it can be worse than a map that was merely captured.
 namespace mirrorbake {
 
 struct RunTimeModel {
   std::string name;
   /// Where in a pixel the lookups lie, from its top left corner, in [0, 1): as many as a pixel has.
   std::vector<glm::vec2> places;
-  /// Size of a lookup's footprint in pixels: differentials are multiplied by it. About 1/√(lookups per pixel), in (0, 1024].
+  /// Size of a lookup's footprint in pixels: differentials are multiplied by it. About 1/√(lookups per
+  /// pixel), in (0, 1024].
   float footprint_scale = 1.0F;
   LookupFilter filter = LookupFilter::anisotropic;
   int max_taps = 4;  ///< of `anisotropic`: 1, or an even number up to 16

@@ -8,8 +8,8 @@
 
 #include "mirrorbake/surface/surface_samples.hpp"
 
-/// The shells of an environment: what arrives at a point along a reflected ray is a stack of layers, the nearest first
-/// ([PEM] §4).
+/// The shells of an environment: what arrives at a point along a reflected ray is a stack of layers, the
+/// nearest first ([PEM] §4).
 namespace mirrorbake {
 
 /// The composite L₀ + (1 − α₀)(L₁ + (1 − α₁)(…)) of premultiplied layers, built front to back.

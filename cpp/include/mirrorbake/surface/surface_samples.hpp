@@ -11,24 +11,25 @@
 
 namespace mirrorbake {
 
-/// The light that the reflected rays of SurfaceSamples bring from one shell of the environment ([PEM] §4 has two, "this method
-/// easily generalizes"): what a ray meets first of the shell's own kind, with the shells in front of it left out. One
-/// entry per sample.
+/// The light that the reflected rays of SurfaceSamples bring from one shell of the environment ([PEM] §4 has
+/// two, "this method easily generalizes"): what a ray meets first of the shell's own kind, with the shells in
+/// front of it left out. One entry per sample.
 struct ShellLight {
   std::string name;
   std::vector<glm::vec4> radiance;  ///< incident, premultiplied, and α; in the last shell α is 1
   std::vector<float> hit_distance;  ///< along the ray to what it meets, metres; +inf: nothing
 };
 
-/// Where the samples of an image's pixels first meet the reflector: what a renderer with environment maps needs to
-/// know, and so the common ground of the rendering matrix and of the run time. One entry per sample that sees
-/// the reflector; all arrays have the same length or, where marked, may be empty. Entries are ordered by pixel,
-/// then by sample.
+/// Where the samples of an image's pixels first meet the reflector: what a renderer with environment maps
+/// needs to know, and so the common ground of the rendering matrix and of the run time. One entry per sample
+/// that sees the reflector; all arrays have the same length or, where marked, may be empty. Entries are
+/// ordered by pixel, then by sample.
 struct SurfaceSamples {
   int width = 0;   ///< of the image, pixels
   int height = 0;  ///< of the image, pixels
   int samples_per_pixel = 0;
-  /// Samples traced per pixel, whatever they saw: one entry per pixel, or none if all are `samples_per_pixel`.
+  /// Samples traced per pixel, whatever they saw: one entry per pixel, or none if all are
+  /// `samples_per_pixel`.
   std::vector<std::uint32_t> pixel_samples;
 
   std::vector<std::uint32_t> pixel;     ///< y · width + x
@@ -36,14 +37,15 @@ struct SurfaceSamples {
   std::vector<std::uint32_t> triangle;  ///< of the reflector's mesh
   std::vector<glm::vec2> barycentric;   ///< weights of the triangle's second and third vertex
   std::vector<glm::vec3> position;      ///< world space
-  /// Unit shading normal, towards the eye. Where the mesh's interpolated normal would reflect the view into the
-  /// surface it is bent until the reflection just leaves it.
+  /// Unit shading normal, towards the eye. Where the mesh's interpolated normal would reflect the view into
+  /// the surface it is bent until the reflection just leaves it.
   std::vector<glm::vec3> normal;
   std::vector<glm::vec3> reflection;  ///< unit direction r = 2(n·v)n − v
 
-  /// Change of `position` and `reflection` per pixel to the right (dx) and down (dy): ray differentials (Igehy,
-  /// SIGGRAPH 1999), the point sliding in its triangle's plane, the normal interpolated. Bounded: near the silhouette
-  /// the cosine to the plane is taken as 0.1 at least, and a change of direction as 2 at most.
+  /// Change of `position` and `reflection` per pixel to the right (dx) and down (dy): ray differentials
+  /// (Igehy, SIGGRAPH 1999), the point sliding in its triangle's plane, the normal interpolated. Bounded:
+  /// near the silhouette the cosine to the plane is taken as 0.1 at least, and a change of direction as 2 at
+  /// most.
   std::vector<glm::vec3> dposition_dx, dposition_dy;
   std::vector<glm::vec3> dreflection_dx, dreflection_dy;
 

@@ -16,8 +16,8 @@ struct Camera {
   bool operator==(const Camera&) const = default;
 };
 
-/// Throws InvalidArgument for sizes outside 1…16384, a field of view outside (0,180), eye = target, an `up` along
-/// the view, or anything not finite.
+/// Throws InvalidArgument for sizes outside 1…16384, a field of view outside (0,180), eye = target, an `up`
+/// along the view, or anything not finite.
 void validate(const Camera& camera);
 
 }  // namespace mirrorbake

@@ -50,10 +50,10 @@ struct TraceOptions {
   std::uint64_t seed = 0;
   /// The part of the camera's image to trace, its pixels as in the whole image; of no size: everything.
   PixelWindow window;
-  /// More than 0: trace_layers takes more samples where the reflectors are noisy, a power of two times samples_per_pixel,
-  /// for a standard error of this much of a pixel's displayed value (sRGB, 0…1), at most most_samples_per_pixel. How many
-  /// a pixel takes is decided by the eight around it alone, which keeps its mean unbiased. samples_per_pixel must then be
-  /// a multiple of 4. In [0, 1].
+  /// More than 0: trace_layers takes more samples where the reflectors are noisy, a power of two times
+  /// samples_per_pixel, for a standard error of this much of a pixel's displayed value (sRGB, 0…1), at most
+  /// most_samples_per_pixel. How many a pixel takes is decided by the eight around it alone, which keeps its
+  /// mean unbiased. samples_per_pixel must then be a multiple of 4. In [0, 1].
   float noise = 0.0F;
   int most_samples_per_pixel = 256;  ///< 1…65536
   /// Called with the finished share of the work, in (0,1], from one thread at a time.
@@ -74,9 +74,9 @@ struct BeautyTrace {
 /// channels are `R`, `G`, `B` for the beauty image, which has the surroundings too; `coverage`; `diffuse.R`
 /// …, `fresnel.R` …, `specular_local.R` … `specular_local.A`, `specular_distant.R` …, `distance`,
 /// `reflection.X` …, `normal.X` …, `position.X` …, means over the covered samples, 0 where there are none;
-/// `part`, the most frequent one, −1 for none; `covariance.R` …; and `background.R` …, the part of the beauty image that
-/// comes from other things than the reflector. `distance` averages the finite ones, and
-/// is +inf where all are infinite.
+/// `part`, the most frequent one, −1 for none; `covariance.R` …; and `background.R` …, the part of the beauty
+/// image that comes from other things than the reflector. `distance` averages the finite ones, and is +inf
+/// where all are infinite.
 ///
 /// Per sample, diffuse + fresnel · (local.rgb + (1 − local.a) · distant) is the beauty value up to float
 /// rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel: `covariance` is what has
@@ -92,8 +92,9 @@ struct LayerTrace {
   SurfaceSamples samples;  ///< with the traced light
   /// Beauty value of each entry of `samples`: what the layers add up to.
   std::vector<glm::vec3> sample_beauty;
-  /// Per pixel: squared standard error of the displayed value (sRGB, 0…1, mean of the channels) of the covered samples'
-  /// mean, estimated from how much four quarters of them differ; what the strata gain beyond that it does not know.
+  /// Per pixel: squared standard error of the displayed value (sRGB, 0…1, mean of the channels) of the
+  /// covered samples' mean, estimated from how much four quarters of them differ; what the strata gain beyond
+  /// that it does not know.
   std::vector<float> display_variance;
 };
 
@@ -142,8 +143,9 @@ class Tracer {
                                        const TraceOptions& options) const;
 
   /// Only what is visible of `reflector`: the geometry part of SurfaceSamples, by the same camera rays as
-  /// trace_layers with the same options. With `places`, numbers in [0, 1) from the pixel's top left corner, the rays go
-  /// through those places of every pixel instead, as a renderer's lookups do, and there are as many samples.
+  /// trace_layers with the same options. With `places`, numbers in [0, 1) from the pixel's top left corner,
+  /// the rays go through those places of every pixel instead, as a renderer's lookups do, and there are as
+  /// many samples.
   SurfaceSamples trace_visibility(const Camera& camera, int reflector, const TraceOptions& options,
                                   std::span<const glm::vec2> places = {}) const;
 

@@ -33,9 +33,9 @@ Polygon cut(const Polygon& from, int axis, double limit, double side) {
   return to;
 }
 
-// Integrals over the parts of a polygon in cells, edge by edge. By Green's theorem the integral of f is that of
-// F dy around the polygon, F(x, y) the integral of f from x to the right. Within the cell of a piece of an edge
-// that one ends at the cell's side; beyond, it is that of all of a cell's width.
+// Integrals over the parts of a polygon in cells, edge by edge. By Green's theorem the integral of f is that
+// of F dy around the polygon, F(x, y) the integral of f from x to the right. Within the cell of a piece of an
+// edge that one ends at the cell's side; beyond, it is that of all of a cell's width.
 class EdgeWalk {
  public:
   EdgeWalk(BilinearMean::Cell* cells, int columns, int rows)

@@ -4,11 +4,11 @@
 // How vectors are passed differs between instruction sets, but none is passed beyond this file.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
-// Several quadrilaterals at once, one in each lane of a vector, over grids of equally many cells. By Green's theorem
-// the integral of f over the part of a quadrilateral in a cell is that of F dy around it, F(x, y) the integral of f
-// from the cell's left side to x, or to its right side if x is beyond it. Neighbours share their edges, so that what
-// one gets less, the other gets more: nothing is lost or counted twice. The sign of all integrals depends on the
-// order of the corners; it goes when weights are made to add up to 1.
+// Several quadrilaterals at once, one in each lane of a vector, over grids of equally many cells. By Green's
+// theorem the integral of f over the part of a quadrilateral in a cell is that of F dy around it, F(x, y) the
+// integral of f from the cell's left side to x, or to its right side if x is beyond it. Neighbours share
+// their edges, so that what one gets less, the other gets more: nothing is lost or counted twice. The sign of
+// all integrals depends on the order of the corners; it goes when weights are made to add up to 1.
 
 namespace mirrorbake::MIRRORBAKE_ISA {
 namespace {
@@ -136,8 +136,8 @@ inline void add_moments(const Piece& piece, float column, Moments& sum) {
   sum.xy += 0.5F * (outer_y + (y * x2 + x * dx * dy * (1.0F / 6.0F)) * dy);
 }
 
-// Integrals of the bilinear interpolation between the corners of cells: weights of the corners. In a cell they are
-// products of x, y, 1 − x and 1 − y, x and y from its corner above left.
+// Integrals of the bilinear interpolation between the corners of cells: weights of the corners. In a cell
+// they are products of x, y, 1 − x and 1 − y, x and y from its corner above left.
 template <typename RowWeight>
 void find_interpolation(const Points (&corners)[4], std::uint32_t rows, std::uint32_t columns,
                         const RowWeight& row_weight, Floats* weights) {
@@ -166,7 +166,8 @@ Floats sum_of(const Floats* values, std::size_t count) {
   return sum;
 }
 
-// Σ (−z)^k / (2k + 1)! is sin(√z)/√z, and z ≤ 2π² on an angular map's square: what is left out is below 1e-11.
+// Σ (−z)^k / (2k + 1)! is sin(√z)/√z, and z ≤ 2π² on an angular map's square: what is left out is below
+// 1e-11.
 inline Floats sine_quotient(Floats z) {
   Floats p = all(1.0F);
   for (int k = 13; k > 0; --k) p = 1.0F - z * p * (1.0F / static_cast<float>(2 * k * (2 * k + 1)));

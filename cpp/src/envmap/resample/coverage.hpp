@@ -14,17 +14,17 @@ inline int floor_of(double v) {
   return static_cast<double>(i) > v ? i - 1 : i;
 }
 
-/// Which part of every pixel a polygon covers, exactly. Every edge leaves in each pixel row it crosses the signed
-/// area to its right, as two entries per crossed pixel, whose running sum along the row is the coverage (the
-/// accumulation buffer of anti-aliased font rasterisers). Neighbouring polygons share their edges, so that what
-/// one covers less, the other covers more: nothing is lost or counted twice.
+/// Which part of every pixel a polygon covers, exactly. Every edge leaves in each pixel row it crosses the
+/// signed area to its right, as two entries per crossed pixel, whose running sum along the row is the
+/// coverage (the accumulation buffer of anti-aliased font rasterisers). Neighbouring polygons share their
+/// edges, so that what one covers less, the other covers more: nothing is lost or counted twice.
 class Coverage {
  public:
   /// Rasterises a polygon given in pixel units, x to the right, y down. It must not intersect itself.
   void rasterize(std::span<const glm::dvec2> corners);
 
-  /// Calls visit(column, row, area) for every pixel of which more than a rounding error is covered; columns and rows
-  /// may be negative or beyond the image.
+  /// Calls visit(column, row, area) for every pixel of which more than a rounding error is covered; columns
+  /// and rows may be negative or beyond the image.
   template <typename Visit>
   void for_each_pixel(Visit&& visit) const {
     for (int row = 0; row < height_; ++row) {

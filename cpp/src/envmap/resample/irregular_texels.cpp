@@ -261,8 +261,8 @@ void IrregularTexels::split(int face, glm::dvec2 low, glm::dvec2 high, const Cor
   gather(face, middle, high, {center, right, corners[2], bottom}, depth + 1);
 }
 
-// The image of a texel in a panorama, as a polygon. Nothing if the texel is so large that its outline may not tell
-// the inside from the outside, or reaches over too many texels of the source.
+// The image of a texel in a panorama, as a polygon. Nothing if the texel is so large that its outline may not
+// tell the inside from the outside, or reaches over too many texels of the source.
 bool IrregularTexels::gather_outline(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners,
                                      DiscExtent place) {
   constexpr double kNear = 0.8;  // cosine of the angle between the centre of a texel and its corners
@@ -364,8 +364,8 @@ void IrregularTexels::trace_within_disc(int face, glm::dvec2 low, glm::dvec2 hig
   if (first && !is_same(before->at, first->at)) trace(face, *before, *first, true, 0);
 }
 
-// So that neighbours are at most half a turn apart. Along a pole the polygon goes from one column to the next; an
-// outline that goes all around a pole is closed along it.
+// So that neighbours are at most half a turn apart. Along a pole the polygon goes from one column to the
+// next; an outline that goes all around a pole is closed along it.
 void IrregularTexels::unroll_outline() {
   polygon_.clear();
   const auto start =

@@ -18,8 +18,8 @@
 namespace mirrorbake {
 
 /// Texels whose image in the source is not a quadrilateral on one face: around poles and other singularities,
-/// across the edges of faces, on the rim of a round map, or large. In a panorama the outline of the image is traced
-/// as closely as needed; elsewhere the texel is subdivided until its parts are quadrilaterals.
+/// across the edges of faces, on the rim of a round map, or large. In a panorama the outline of the image is
+/// traced as closely as needed; elsewhere the texel is subdivided until its parts are quadrilaterals.
 class IrregularTexels {
  public:
   explicit IrregularTexels(const ResampleJob& job);
@@ -27,12 +27,13 @@ class IrregularTexels {
   /// Most taps that find() returns.
   static constexpr std::size_t kMostTaps = 1 << 16;
 
-  /// The taps of the texel of `face` that spans the given rectangle of the target; their
-  /// weights add up to 1, or there are none. Nothing if there are too many: such a texel shrinks the source so
-  /// much that `automatic` does not interpolate.
+  /// The taps of the texel of `face` that spans the given rectangle of the target; their weights add up to 1,
+  /// or there are none. Nothing if there are too many: such a texel shrinks the source so much that
+  /// `automatic` does not interpolate.
   std::optional<std::span<const Tap>> find(int face, glm::dvec2 low, glm::dvec2 high);
 
-  /// The same of a texel whose image is a quadrilateral on one face of the source, with this share of interpolation.
+  /// The same of a texel whose image is a quadrilateral on one face of the source, with this share of
+  /// interpolation.
   std::optional<std::span<const Tap>> find_straight(int face, const Quad& quad, double share);
 
   /// Hands the taps of a texel of any size out, some at a time, for the filter `area`. A texel may come

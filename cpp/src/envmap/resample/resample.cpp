@@ -22,8 +22,8 @@
 
 // Resampling is linear: a texel of the target is a sum of weights times texels of the source, its taps. Turns
 // and mirrors that take both grids to themselves take taps to taps, so that they are found for one texel of
-// every orbit and applied to all (docs/adr/0021). The target is worked off in square tiles; the taps of a tile
-// stay in the cache while they are applied.
+// every orbit and applied to all (docs/adr/0021). The target is worked off in square tiles; the taps of a
+// tile stay in the cache while they are applied.
 
 namespace mirrorbake {
 
@@ -50,8 +50,8 @@ void check_texels(const char* name, const EnvMapLayout& layout) {
 
 // Tiles of the target that have texels to find taps for.
 std::vector<Tile> tiles_of(const ResampleJob& job, std::span<const SharedSymmetry> symmetries) {
-  // Tiles that read some 90² texels of the source, as far as these are spread evenly, and wider than high, since
-  // most symmetries take rows to rows; of small maps small ones, so that every thread gets some.
+  // Tiles that read some 90² texels of the source, as far as these are spread evenly, and wider than high,
+  // since most symmetries take rows to rows; of small maps small ones, so that every thread gets some.
   constexpr int kAspect = 4;
   const double texels = static_cast<double>(job.target.level_texels(0));
   const double ratio = std::sqrt(static_cast<double>(job.source.level_texels(0)) / texels);

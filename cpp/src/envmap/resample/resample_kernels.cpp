@@ -349,8 +349,8 @@ inline typename L::Floats block_sum(const Block<L>& block, const float* weights)
   return L::narrow(whole);
 }
 
-// `kStride` 0: known at run time only. Returns whether a sum is not a number: texels that are not finite spoil sums
-// even if their weight is 0.
+// `kStride` 0: known at run time only. Returns whether a sum is not a number: texels that are not finite
+// spoil sums even if their weight is 0.
 template <int kValues, int kStride, std::uint32_t kColumns, bool kSkipZeros>
 bool apply_group(const float* __restrict values, std::size_t stride_, const BlockGroup& group,
                  const BlockSteps& steps, const std::uint32_t* __restrict texels,

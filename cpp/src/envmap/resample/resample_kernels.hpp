@@ -66,8 +66,8 @@ struct BlockSteps {
   std::int32_t per_column;
 };
 
-/// Texels of a tile and their images in the source, each by the number of its corner above left; `pitch` is the
-/// number of corners in a row.
+/// Texels of a tile and their images in the source, each by the number of its corner above left; `pitch` is
+/// the number of corners in a row.
 struct TileImages {
   PositionArrays corners;
   std::size_t pitch;
@@ -104,7 +104,8 @@ struct FaceSize {
   bool is_periodic;
 };
 
-/// Solid angles of the texels of a face, up to a factor: by row or by texel, row by row, if either is not null.
+/// Solid angles of the texels of a face, up to a factor: by row or by texel, row by row, if either is not
+/// null.
 struct TexelWeights {
   const double* by_row;
   const double* by_texel;
@@ -145,8 +146,8 @@ struct ResampleKernels {
                                  const std::uint16_t* columns, std::size_t count, std::uint32_t* numbers);
 
   /// result[targets[i]] = Σ weight · value of the texels of block i, whose first one is texels[i]. Sums are
-  /// taken in float; of more than 32 texels row by row, and those of rows in double. Texels of no weight are not
-  /// looked at if they are not finite. `may_read_past` allows to read one value past those of a texel.
+  /// taken in float; of more than 32 texels row by row, and those of rows in double. Texels of no weight are
+  /// not looked at if they are not finite. `may_read_past` allows to read one value past those of a texel.
   void (*apply_blocks)(const float* values, int channels, const BlockGroup& group, const BlockSteps& steps,
                        const std::uint32_t* texels, const float* weights, const std::uint32_t* targets,
                        bool may_read_past, float* result);

@@ -50,9 +50,9 @@ StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& t
   const double length = few ? 0.0 : std::min(0.25 * (source.width + 4), kLongest);
   constexpr double kAny = std::numeric_limits<double>::max();
   switch (source.projection.kind) {
-    // Around the poles of a panorama images are long and bent along their length. Straight edges n texels of the target
-    // away from one shift 1/(12 n) of the area, which is lost or counted twice beside a texel that is traced. Towards the
-    // rim of a sphere map all images are so.
+    // Around the poles of a panorama images are long and bent along their length. Straight edges n texels of
+    // the target away from one shift 1/(12 n) of the area, which is lost or counted twice beside a texel that
+    // is traced. Towards the rim of a sphere map all images are so.
     case ProjectionKind::latlong:
       return {target.projection.kind == ProjectionKind::sphere_map ? 0.03 : 0.1, kAny, length};
     case ProjectionKind::cube:

@@ -6,11 +6,12 @@
 #include "mirrorbake/envmap/envmap.hpp"
 #include "resample_kernels.hpp"
 
-/// Which texels' images in the source are straight enough for one quadrilateral, and how much of them is interpolated.
+/// Which texels' images in the source are straight enough for one quadrilateral, and how much of them is
+/// interpolated.
 namespace mirrorbake {
 
-/// None of a map of few texels is straight enough: that its corners make a parallelogram says nothing of edges that
-/// bend alike.
+/// None of a map of few texels is straight enough: that its corners make a parallelogram says nothing of
+/// edges that bend alike.
 StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& target);
 /// Limits of the parts into which a texel that is not straight is divided.
 StraightLimits limits_of_parts(const EnvMapLayout& source, const StraightLimits& limits);
@@ -29,8 +30,8 @@ double texel_side(double area, double squares);
 /// of the source nothing is left to alias, so that the change is quick.
 double interpolated_share(double side);
 
-/// How much of that is left at a place of a sphere map as source, in texels: less near its rim, where the next texel may be
-/// beyond it, and interpolation would hand flux out to what has none.
+/// How much of that is left at a place of a sphere map as source, in texels: less near its rim, where the
+/// next texel may be beyond it, and interpolation would hand flux out to what has none.
 double interpolable(const EnvMapLayout& sphere_map, glm::dvec2 position);
 
 }  // namespace mirrorbake

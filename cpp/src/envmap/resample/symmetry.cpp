@@ -116,8 +116,8 @@ std::vector<SharedSymmetry> shared_symmetries(const EnvMapLayout& source, const 
   const glm::dmat3 inverse = glm::transpose(matrix);
   std::vector<SharedSymmetry> shared;
   for (const glm::dmat3& of_target : signed_permutations()) {
-    // The only one that may do the same in the source, and whether it does. Products with signed permutations are
-    // exact: a matrix that is symmetric but for rounding is not taken for symmetric.
+    // The only one that may do the same in the source, and whether it does. Products with signed permutations
+    // are exact: a matrix that is symmetric but for rounding is not taken for symmetric.
     glm::dmat3 of_source = matrix * of_target * inverse;
     for (int i = 0; i < 3; ++i) of_source[i] = glm::round(of_source[i]);
     if (of_source * matrix != matrix * of_target) continue;

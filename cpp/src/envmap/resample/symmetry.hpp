@@ -19,8 +19,9 @@ struct TexelPlace {
   bool operator==(const TexelPlace&) const = default;
 };
 
-/// Where a symmetry takes the texels of one face: rows and columns of `face` are sums of whole multiples (0, 1
-/// or −1) of the row and the column before, and of an offset. Columns of a panorama count on across its seam.
+/// Where a symmetry takes the texels of one face: rows and columns of `face` are sums of whole multiples (0,
+/// 1 or −1) of the row and the column before, and of an offset. Columns of a panorama count on across its
+/// seam.
 struct FaceMap {
   int face = 0;
   int row_per_row = 1;

@@ -65,8 +65,8 @@ struct TexelLines {
   LineTables centers;
 };
 
-/// Finds taps tile by tile. Positions and kinds of texels come from vectorised loops; then every texel's image
-/// in the source, a quadrilateral, is laid over the texels of the source.
+/// Finds taps tile by tile. Positions and kinds of texels come from vectorised loops; then every texel's
+/// image in the source, a quadrilateral, is laid over the texels of the source.
 class TapBuilder {
  public:
   /// Keeps references to what it is given.

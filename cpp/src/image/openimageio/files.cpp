@@ -29,9 +29,9 @@ const char* plugin_name(FileKind kind) {
   return "";
 }
 
-// Bytes of pixels from one byte of the file: deflate, in PNG and TIFF, gives at most 1032; JPEG 1024: six blocks of two bits
-// at least for 16 x 16 pixels of 3 bytes, if its chroma is subsampled; LZW 2730; T.6 a row of 65536 white pixels for one bit.
-// OpenEXR's DCT is not looked into.
+// Bytes of pixels from one byte of the file: deflate, in PNG and TIFF, gives at most 1032; JPEG 1024: six
+// blocks of two bits at least for 16 x 16 pixels of 3 bytes, if its chroma is subsampled; LZW 2730; T.6 a row
+// of 65536 white pixels for one bit. OpenEXR's DCT is not looked into.
 std::uint64_t most_expansion(FileKind kind, bool is_fax) {
   if (kind == FileKind::exr) return 0;
   if (kind == FileKind::tiff) return is_fax ? 65536 : 2730;
@@ -89,8 +89,8 @@ OIIO::ImageSpec specification(const SaveRequest& request) {
   return spec;
 }
 
-// Rounds a colour to what RGBE holds, three mantissas of 8 bits and the largest one's exponent: the writer cuts off what
-// is beyond, which darkens images by half a percent.
+// Rounds a colour to what RGBE holds, three mantissas of 8 bits and the largest one's exponent: the writer
+// cuts off what is beyond, which darkens images by half a percent.
 void round_to_rgbe(std::span<float, 3> color) {
   int exponent = 0;
   const float largest = std::max({color[0], color[1], color[2]});
@@ -217,7 +217,8 @@ SaveReport save_file(const SaveRequest& request) {
   const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin_name(request.kind));
   if (!output) fail(OIIO::geterror());
   output->threads(thread_count());
-  // The PNG writer does not notice a full disk, and the JPEG writer ends the program: these get none to write to.
+  // The PNG writer does not notice a full disk, and the JPEG writer ends the program: these get none to write
+  // to.
   const bool in_memory = request.kind == FileKind::png || request.kind == FileKind::jpeg;
   if (in_memory && !output->set_ioproxy(&memory)) fail("not to memory");
   if (!output->open(request.file, spec)) fail(output->geterror());

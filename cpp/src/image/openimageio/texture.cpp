@@ -27,8 +27,8 @@ int colour_channels(const OIIO::ImageSpec& source) {
   return source.nchannels - (source.alpha_channel >= 0 && source.nchannels > 1 ? 1 : 0);
 }
 
-// A file as the texture system sees it: linear colours without alpha. Names are "number:transfer:path", the number
-// because a path may be opened again when its file has changed.
+// A file as the texture system sees it: linear colours without alpha. Names are "number:transfer:path", the
+// number because a path may be opened again when its file has changed.
 class LinearInput : public OIIO::ImageInput {
  public:
   static OIIO::ImageInput* create() { return new LinearInput; }
@@ -121,8 +121,8 @@ class LinearInput : public OIIO::ImageInput {
   std::size_t channels_ = 0;
 };
 
-// One for all files, and until the process ends, never destroyed: threads may look up to the last. OpenImageIO 2 makes a
-// pointer of it, 3 a shared one.
+// One for all files, and until the process ends, never destroyed: threads may look up to the last.
+// OpenImageIO 2 makes a pointer of it, 3 a shared one.
 OIIO::TextureSystem& texture_system() {
   static const auto* const system = [] {
     auto* const made = new auto(OIIO::TextureSystem::create(false));

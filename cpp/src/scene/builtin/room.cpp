@@ -241,8 +241,8 @@ Scene make_room() {
   add_painting(f, "circles", {0.10F, 0.45F, kSouth}, {-1.0F, 0, 0}, 0.75F, textures::circles());
   add_clock(f, {1.25F, 1.05F, kSouth}, 0.2F);
 
-  // The side towards +Z and +X is where views usually are: only low things lie there, near the table's edge, where they
-  // are reflected but hide nothing.
+  // The side towards +Z and +X is where views usually are: only low things lie there, near the table's edge,
+  // where they are reflected but hide nothing.
   furniture::add_book_pile(f, {-0.10F, 0.0F, -0.30F}, 8.0F);
   furniture::add_vase(f, {0.10F, 0.0F, -0.36F});
   furniture::add_cup_and_saucer(f, "mint cup", {-0.27F, 0.0F, -0.17F}, 200.0F, from_srgb(0x9fd0bf));

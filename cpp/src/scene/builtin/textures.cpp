@@ -16,8 +16,8 @@ namespace {
 
 constexpr float kTwoPi = 2.0F * std::numbers::pi_v<float>;
 
-// Calls colour(u, v) for points of the unit square, v up. Every texel is the mean of kSupersampling² points: 1 is
-// enough for what has no sharp edges.
+// Calls colour(u, v) for points of the unit square, v up. Every texel is the mean of kSupersampling² points:
+// 1 is enough for what has no sharp edges.
 template <int kSupersampling = 2, typename Colour>
 Image paint(int width, int height, const Colour& colour) {
   Image image(width, height, {"R", "G", "B"});

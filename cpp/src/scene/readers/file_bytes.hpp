@@ -6,7 +6,8 @@
 
 namespace mirrorbake {
 
-/// The whole of a regular file, so that nothing later allocates more than the file's size justifies. Throws FileError.
+/// The whole of a regular file, so that nothing later allocates more than the file's size justifies. Throws
+/// FileError.
 std::string read_file(const std::filesystem::path& path);
 
 /// The file that a reference inside `directory`'s scene file means: relative, and after following links still

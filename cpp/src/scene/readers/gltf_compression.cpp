@@ -110,7 +110,8 @@ void decompress_views(const std::string& path, tinygltf::Model& model) {
     const std::uint64_t count = number("count");
     if (offset > source.size() || length > source.size() - offset)
       fail(path, where + " ends beyond its buffer");
-    // Each block of the codec has a header of a quarter of a byte for 16 elements, so that sizes are bounded by the file's.
+    // Each block of the codec has a header of a quarter of a byte for 16 elements, so that sizes are bounded
+    // by the file's.
     if (stride == 0 || stride > 256 || count > 64 * length || count * stride != view.byteLength) {
       fail(path, where + " has " + std::to_string(count) + " elements of " + std::to_string(stride) +
                      " bytes, which its sizes do not allow");

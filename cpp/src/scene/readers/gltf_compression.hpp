@@ -11,7 +11,8 @@
 #include "gltf_document.hpp"
 #include "mirrorbake/scene/load.hpp"
 
-/// Compressed meshes: KHR_draco_mesh_compression through Draco, EXT_meshopt_compression through meshoptimizer.
+/// Compressed meshes: KHR_draco_mesh_compression through Draco, EXT_meshopt_compression through
+/// meshoptimizer.
 namespace mirrorbake::gltf {
 
 inline constexpr const char* kDraco = "KHR_draco_mesh_compression";
@@ -20,7 +21,8 @@ inline constexpr const char* kMeshopt = "EXT_meshopt_compression";
 /// A decoded primitive.
 class DracoMesh {
  public:
-  /// `extension` is the object of that name in the primitive. Throws FileError for what Draco cannot decode and beyond `limits`.
+  /// `extension` is the object of that name in the primitive. Throws FileError for what Draco cannot decode
+  /// and beyond `limits`.
   DracoMesh(const std::string& path, const tinygltf::Model& model, const tinygltf::Value& extension,
             const MeshLimits& limits);
   ~DracoMesh();
@@ -37,8 +39,8 @@ class DracoMesh {
   std::unique_ptr<State> state_;
 };
 
-/// Decodes the buffer views that are compressed by meshoptimizer into buffers of their own, and lets the views refer to
-/// them. Throws FileError if one cannot be decoded.
+/// Decodes the buffer views that are compressed by meshoptimizer into buffers of their own, and lets the
+/// views refer to them. Throws FileError if one cannot be decoded.
 void decompress_views(const std::string& path, tinygltf::Model& model);
 
 }  // namespace mirrorbake::gltf

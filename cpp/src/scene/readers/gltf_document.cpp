@@ -55,9 +55,9 @@ void check_json(const std::string& path, std::string_view json) {
   }
 }
 
-// tinygltf asks for a view of every accessor of indices and for data of every buffer, which compressed files do not have:
-// their accessors may stand for what Draco decodes, and their buffers for what meshoptimizer does. They get a view of this
-// name and a buffer of one byte. Nothing for files that need no such change.
+// tinygltf asks for a view of every accessor of indices and for data of every buffer, which compressed files
+// do not have: their accessors may stand for what Draco decodes, and their buffers for what meshoptimizer
+// does. They get a view of this name and a buffer of one byte. Nothing for files that need no such change.
 constexpr const char* kPlaceholder = "\x01placeholder";
 
 std::optional<std::string> without_placeholders(std::string_view json) {
@@ -121,7 +121,8 @@ std::string_view json_chunk(const std::string& path, std::string_view bytes) {
   return bytes.substr(kHeader + kChunkHeader, length);
 }
 
-// tinygltf asks for files by joining the directory and the reference; these callbacks let it see only what is inside.
+// tinygltf asks for files by joining the directory and the reference; these callbacks let it see only what is
+// inside.
 struct Directory {
   std::filesystem::path root;
   std::string refused;   // the first reference that points outside
@@ -138,7 +139,8 @@ struct Directory {
   }
 };
 
-// tinygltf knows seven media types, and takes URIs of data with another type or a character set for names of files.
+// tinygltf knows seven media types, and takes URIs of data with another type or a character set for names of
+// files.
 std::optional<std::string_view> data_uri(std::string_view joined) {
   const std::size_t at = joined.find("data:");
   if (at == std::string_view::npos || (at > 0 && joined[at - 1] != '/')) return std::nullopt;
@@ -194,8 +196,8 @@ bool refuse_to_write(std::string*, const std::string&, const std::vector<unsigne
   return true;
 }
 
-// tinygltf takes either all callbacks or none, and falls back to the whole file system without a word. What "all"
-// is depends on its version: 2.9 asks for the size of a file too.
+// tinygltf takes either all callbacks or none, and falls back to the whole file system without a word. What
+// "all" is depends on its version: 2.9 asks for the size of a file too.
 template <typename Callbacks>
 Callbacks file_callbacks(Directory* directory) {
   Callbacks callbacks{};
@@ -311,7 +313,8 @@ bool is_index_type(int type) {
          type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
 }
 
-// Calls put(index, place of its values) for the sparse replacements, glTF 2.0 §3.6.2.3, of elements of `size` bytes.
+// Calls put(index, place of its values) for the sparse replacements, glTF 2.0 §3.6.2.3, of elements of `size`
+// bytes.
 template <typename Put>
 void apply_sparse(const std::string& path, const tinygltf::Model& model, const tinygltf::Accessor& accessor,
                   const std::string& what, std::size_t size, const Put& put) {

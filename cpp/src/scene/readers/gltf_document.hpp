@@ -13,9 +13,9 @@
 /// A parsed .gltf or .glb file that is distrusted until each access has been checked.
 namespace mirrorbake::gltf {
 
-/// Parses the file and reads its buffers. Buffers and images outside the file's directory are refused. Images of data
-/// URIs are kept as encoded bytes, others not at all. Throws FileError for anything malformed, JSON nested deeper than 256 levels, and
-/// extensions that the file requires but this reader does not know.
+/// Parses the file and reads its buffers. Buffers and images outside the file's directory are refused. Images
+/// of data URIs are kept as encoded bytes, others not at all. Throws FileError for anything malformed, JSON
+/// nested deeper than 256 levels, and extensions that the file requires but this reader does not know.
 tinygltf::Model read_document(const std::string& path);
 
 /// The name of a file that a URI of the document means: "%20" is a space, and so on.
@@ -39,8 +39,8 @@ struct Numbers {
   std::vector<float> values;  ///< count × components
 };
 
-/// Reads an accessor of floating-point or integer components. `wanted` is its type, TINYGLTF_TYPE_…, `what` names
-/// the use in errors. Throws FileError if any index, offset, stride or count is out of range.
+/// Reads an accessor of floating-point or integer components. `wanted` is its type, TINYGLTF_TYPE_…, `what`
+/// names the use in errors. Throws FileError if any index, offset, stride or count is out of range.
 Numbers read_numbers(const std::string& path, const tinygltf::Model& model, int accessor, int wanted,
                      std::string_view what);
 

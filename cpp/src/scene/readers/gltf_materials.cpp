@@ -77,7 +77,8 @@ glm::vec3 resampled(const Image& image, int x, int y, int width, int height) {
                   fy - static_cast<float>(y0));
 }
 
-// An image of which each texel is `value`(base colour, metallic-roughness) of the images given, at the larger size.
+// An image of which each texel is `value`(base colour, metallic-roughness) of the images given, at the larger
+// size.
 template <typename Value>
 Image combined(const Image* base, const Image* metallic_roughness, int channels, const Value& value) {
   int width = 1;

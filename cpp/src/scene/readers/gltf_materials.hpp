@@ -26,7 +26,8 @@ class MaterialReader {
   MaterialReader(const std::string& path, const tinygltf::Model& model, const SceneOptions& options,
                  Warnings& warnings, Scene& scene);
 
-  /// Appends the material of this number (−1: the default one) and its textures to the scene; returns its place there.
+  /// Appends the material of this number (−1: the default one) and its textures to the scene; returns its
+  /// place there.
   int add(int material);
 
   /// The set of texture coordinates that the material's textures use: the first one's; others are counted.

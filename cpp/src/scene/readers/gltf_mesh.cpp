@@ -156,7 +156,8 @@ class GltfBuilder {
     has_colors_ = has_colors_ || !vertices.colors.empty();
   }
 
-  // The numbers of an attribute, one row for each vertex; nothing if there is none. `type` 0 stands for VEC3 or VEC4.
+  // The numbers of an attribute, one row for each vertex; nothing if there is none. `type` 0 stands for VEC3
+  // or VEC4.
   gltf::Numbers numbers(const tinygltf::Primitive& primitive, const std::string& name, int type,
                         const char* what, std::size_t vertex_count) const {
     const int accessor = attribute(primitive, name);

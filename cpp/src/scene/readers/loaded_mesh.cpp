@@ -20,7 +20,8 @@ glm::dvec3 facet_cross(const std::vector<glm::vec3>& positions, glm::uvec3 t) {
   return glm::cross(glm::dvec3(positions[t.y]) - a, glm::dvec3(positions[t.z]) - a);
 }
 
-// Number of each vertex's place, counted from 0 in an order that only depends on the positions and `smoothing`.
+// Number of each vertex's place, counted from 0 in an order that only depends on the positions and
+// `smoothing`.
 std::vector<std::uint32_t> weld_positions(const std::vector<glm::vec3>& positions,
                                           std::span<const std::uint64_t> smoothing) {
   const auto before = [&](std::uint32_t a, std::uint32_t b) {

@@ -42,17 +42,19 @@ LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits);
 /// Extension of a file name in lower case, with its dot.
 std::string lower_extension(const std::string& path);
 
-/// Throws FileError naming the first vertex, from number `first` on, that is not finite or beyond what a scene accepts.
+/// Throws FileError naming the first vertex, from number `first` on, that is not finite or beyond what a
+/// scene accepts.
 void check_positions(const std::string& path, const std::vector<glm::vec3>& positions, std::size_t first = 0);
 
 /// Throws FileError if one vertex or triangle more than `vertices` and `triangles` is beyond `limits`.
 void check_limits(const std::string& path, std::uint64_t vertices, std::uint64_t triangles,
                   const MeshLimits& limits);
 
-/// Gives every vertex whose normal is missing (shorter than 1e-6) the mean of the facet normals around it, weighted with the
-/// angle of the facet (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", JGT 3(1), 1998). Vertices at
-/// the same place count as one (files often split them for texture coordinates) if their entries of `smoothing`, one per
-/// vertex or none at all, are equal. Others are normalised.
+/// Gives every vertex whose normal is missing (shorter than 1e-6) the mean of the facet normals around it,
+/// weighted with the angle of the facet (Thürmer and Wüthrich, "Computing vertex normals from polygonal
+/// facets", JGT 3(1), 1998). Vertices at the same place count as one (files often split them for texture
+/// coordinates) if their entries of `smoothing`, one per vertex or none at all, are equal. Others are
+/// normalised.
 void complete_normals(TriangleMesh& mesh, std::span<const std::uint64_t> smoothing = {});
 
 /// Drops triangles without area and then vertices that no triangle uses. Throws FileError if nothing remains.

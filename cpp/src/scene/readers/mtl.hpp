@@ -37,8 +37,8 @@ struct Definition {
 /// The first word of a line, and the rest without the spaces around it.
 std::pair<std::string_view, std::string_view> split_keyword(std::string_view line);
 
-/// Reads a library. Lines with numbers that are missing, not finite or out of range are left out with a warning: every
-/// loader does, and so do the programs that write such lines.
+/// Reads a library. Lines with numbers that are missing, not finite or out of range are left out with a
+/// warning: every loader does, and so do the programs that write such lines.
 std::vector<Definition> parse(std::string_view text, Warnings& warnings);
 
 /// The material with its maps' transforms, but not yet their textures.

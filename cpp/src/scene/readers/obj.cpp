@@ -36,7 +36,8 @@ std::optional<float> finite_float(std::string_view token) {
   return static_cast<float>(value);
 }
 
-// position, position/uv, position//normal or position/uv/normal, each an integer. What follows a slash may be missing.
+// position, position/uv, position//normal or position/uv/normal, each an integer. What follows a slash may be
+// missing.
 std::optional<ObjCorner> corner_from(std::string_view token) {
   std::array<int, 3> indices{};
   for (int part = 0; part < 3; ++part) {
@@ -53,8 +54,8 @@ std::optional<ObjCorner> corner_from(std::string_view token) {
   return std::nullopt;
 }
 
-// The reader of one file. Where an object (`o`) is named, groups (`g`) are stretches of it; in files without, they are the
-// objects.
+// The reader of one file. Where an object (`o`) is named, groups (`g`) are stretches of it; in files without,
+// they are the objects.
 class ObjReader {
  public:
   ObjReader(const std::string& path, const MeshLimits& limits, ObjContent& content)

@@ -82,8 +82,8 @@ std::uint32_t ObjBuilder::vertex_for(std::uint32_t position, std::uint32_t norma
   const std::uint64_t smoothing = normal != kNone ? 0 : smoothing_ != 0 ? smoothing_ : kFlat + face_;
   for (std::uint32_t v = first_use_[position]; v != kNone; v = uses_[v].next) {
     if (uses_[v].normal == normal && uses_[v].uv == uv && uses_[v].smoothing == smoothing) return v;
-    // Faces come one after another: another flat face's vertex at the head ends the search, or a fan of flat faces
-    // would take the square of their number.
+    // Faces come one after another: another flat face's vertex at the head ends the search, or a fan of flat
+    // faces would take the square of their number.
     if (smoothing >= kFlat && uses_[v].smoothing >= kFlat && uses_[v].smoothing != smoothing) break;
   }
   TriangleMesh& mesh = loaded_.mesh;

@@ -33,7 +33,8 @@ class ObjBuilder {
   void add_uv(glm::vec2 uv) { uvs_.push_back(uv); }
   void add_face(std::span<const ObjCorner> corners);
 
-  /// Groups of faces that share normals where the file gives none: 0 is flat. Until it is called, all share one.
+  /// Groups of faces that share normals where the file gives none: 0 is flat. Until it is called, all share
+  /// one.
   void set_smoothing(std::uint32_t group) { smoothing_ = group; }
   void set_name(const std::string& name);
   void set_material(const std::string& name);

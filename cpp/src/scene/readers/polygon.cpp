@@ -13,8 +13,8 @@
 namespace mirrorbake {
 namespace {
 
-// Ear clipping that looks at all corners for every ear may take time in the cube of their number. Beyond this, only
-// reflex corners in reach are looked at.
+// Ear clipping that looks at all corners for every ear may take time in the cube of their number. Beyond
+// this, only reflex corners in reach are looked at.
 constexpr std::size_t kMaxEarCorners = 512;
 // How many corners may be looked at: a second of work. Polygons that somebody drew take a few for each ear.
 constexpr std::uint64_t kMostLooks = 200'000'000;
@@ -53,8 +53,8 @@ class Polygon {
   glm::dvec3 area_{0.0};
 };
 
-// Ears of a polygon of many corners, clipped from a ring. The reflex corners, the only ones that can lie in an ear, are in
-// the buckets of a grid over the polygon's plane.
+// Ears of a polygon of many corners, clipped from a ring. The reflex corners, the only ones that can lie in
+// an ear, are in the buckets of a grid over the polygon's plane.
 class Ring {
  public:
   Ring(const std::string& path, std::span<const std::uint32_t> corners,

@@ -32,19 +32,20 @@ class TextureReader {
  public:
   TextureReader(const SceneOptions& options, Warnings& warnings) : options_(options), warnings_(warnings) {}
 
-  /// Colour or grey in [0,1], without alpha. Values beyond 1, which only images of floats have, are divided by the
-  /// largest, which is returned in `largest` (1 if there are none), or else cut off and counted. Throws FileError
-  /// for what decode_image refuses, values that are not finite or negative, and when the limits are exceeded.
+  /// Colour or grey in [0,1], without alpha. Values beyond 1, which only images of floats have, are divided
+  /// by the largest, which is returned in `largest` (1 if there are none), or else cut off and counted.
+  /// Throws FileError for what decode_image refuses, values that are not finite or negative, and when the
+  /// limits are exceeded.
   Image read(const std::string& name, std::span<const unsigned char> bytes, Transfer transfer,
              float* largest = nullptr);
 
-  /// The alpha channel of an image, or else, if `grey_counts`, its first channel; none if the surface is opaque
-  /// everywhere. Errors as for read().
+  /// The alpha channel of an image, or else, if `grey_counts`, its first channel; none if the surface is
+  /// opaque everywhere. Errors as for read().
   std::optional<Image> read_opacity(const std::string& name, std::span<const unsigned char> bytes,
                                     bool grey_counts);
 
-  /// The texture of an image file that is used as it is: in memory, or through the cache if it is large. Large ones beyond 1
-  /// are an error.
+  /// The texture of an image file that is used as it is: in memory, or through the cache if it is large.
+  /// Large ones beyond 1 are an error.
   Texture read_file_texture(const std::string& path, Transfer transfer, float* largest = nullptr);
 
   /// Takes room for a texture that is made here. Throws FileError(name) beyond the limits.
@@ -61,13 +62,14 @@ class TextureReader {
   std::uint64_t bytes_ = 0;
 };
 
-/// Throws FileError unless each component is finite and at least 0; what is above 1 is taken as 1 and counted.
+/// Throws FileError unless each component is finite and at least 0; what is above 1 is taken as 1 and
+/// counted.
 glm::vec3 reflectance(const std::string& path, const std::string& what, glm::vec3 value, Warnings& warnings);
 /// Throws FileError unless each component is finite and at least 0.
 glm::vec3 radiance(const std::string& path, const std::string& what, glm::vec3 value);
 
-/// One object per owner and material, in the order in which they first occur. `material_of` gives the scene's material
-/// for the file's; the names of materials are the scene's.
+/// One object per owner and material, in the order in which they first occur. `material_of` gives the scene's
+/// material for the file's; the names of materials are the scene's.
 std::vector<Object> split_into_objects(LoadedMesh&& loaded, const std::vector<Material>& materials,
                                        const std::map<int, int>& material_of);
 

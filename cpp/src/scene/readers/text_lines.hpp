@@ -6,8 +6,8 @@
 
 namespace mirrorbake {
 
-/// Lines of an OBJ or MTL file: they end with a line feed, a carriage return or both; a backslash at a line's end joins the
-/// next one to it. A byte-order mark before the first is skipped.
+/// Lines of an OBJ or MTL file: they end with a line feed, a carriage return or both; a backslash at a line's
+/// end joins the next one to it. A byte-order mark before the first is skipped.
 class TextLines {
  public:
   explicit TextLines(std::string_view text);

@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from mirrorbake.errors import InputError
-from mirrorbake.evaluate.contenders import MAIN_RUN_TIME, TITLES
+from mirrorbake.evaluate.contenders import TITLES
 from mirrorbake.evaluate.evaluate import Onlooker
 from mirrorbake.evaluate.metrics import display_referred
 from mirrorbake.evaluate.places import choose_views
@@ -99,7 +99,7 @@ def _view(seen: SeenView, window: Window) -> _View:
     else:
         title = "Half-way between two samples"
         note = f"{where}: {view.degrees:.3g}° from the nearest, their maps blended"
-    run_time = MAIN_RUN_TIME
+    run_time = seen.run_time
     chosen = [name for name in SHEET_CONTENDERS if name in seen.pictures]
     return _View(
         title=title,

@@ -32,7 +32,13 @@ MOST_KEPT = 16
 """Samples whose single-layer maps are kept in memory: views at the same ones come apart in an evaluation."""
 
 MAIN_RUN_TIME = "reference"
-"""The one that pictures and studies show."""
+"""The one that pictures and studies show of maps that were inferred for none of `RUN_TIMES`."""
+
+
+def main_run_time(pem: OpenedPem) -> str:
+    """Return the name of the run time that a PEM's maps were inferred for: the one to show of it."""
+    own = pem.run_time.model
+    return next((name for name, model in RUN_TIMES.items() if model == own), MAIN_RUN_TIME)
 
 
 def run_time_of(pem: OpenedPem, name: str) -> _core.RunTimeModel:

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from mirrorbake.errors import InputError
-from mirrorbake.evaluate.contenders import CONTENDERS, MAIN_RUN_TIME, RUN_TIMES, Frame, contenders_of
+from mirrorbake.evaluate.contenders import (
+    CONTENDERS,
+    MAIN_RUN_TIME,
+    RUN_TIMES,
+    Frame,
+    contenders_of,
+    main_run_time,
+)
 from mirrorbake.evaluate.metrics import (
     DISPLAY_TRANSFORM,
     flip,
@@ -155,6 +162,8 @@ class SeenView:
     reference: Reference
     pictures: dict[str, dict[str, FloatArray]]
     """Radiance (H, W, 3) of the object in the reference's window, by contender and run time."""
+    run_time: str
+    """The one to show: that of the PEM's maps."""
 
 
 class Onlooker:
@@ -200,7 +209,7 @@ class Onlooker:
             return None if None in errors else min(error for error in errors if error is not None)
 
         reference = refined_reference(stage, view.camera, window, self.cache, best_error, self._margin)
-        return SeenView(view, reference, pictures) if reference.mask.any() else None
+        return SeenView(view, reference, pictures, main_run_time(self.pem)) if reference.mask.any() else None
 
 
 def evaluate(

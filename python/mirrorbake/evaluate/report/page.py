@@ -10,7 +10,7 @@ from importlib import metadata, resources
 from typing import TYPE_CHECKING
 
 from mirrorbake import _core
-from mirrorbake.evaluate.contenders import MAIN_RUN_TIME, RUN_TIMES, TITLES
+from mirrorbake.evaluate.contenders import RUN_TIMES, TITLES
 from mirrorbake.evaluate.evaluate import Evaluation, SeenView, evaluate, finite
 from mirrorbake.evaluate.metrics import mean_or_none
 from mirrorbake.evaluate.places import PLACE_TITLES
@@ -249,7 +249,7 @@ def _pictures(pictured: dict[str, SeenView]) -> str:
 
 
 def _card(seen: SeenView) -> str:
-    reference, view, run_time = seen.reference, seen.view, MAIN_RUN_TIME
+    reference, view, run_time = seen.reference, seen.view, seen.run_time
     true = reference.images.beauty
     names = list(seen.pictures)
     traced = picture_url(true)

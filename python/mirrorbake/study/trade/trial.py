@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from mirrorbake import _core
 from mirrorbake.bake.bake import bake
-from mirrorbake.evaluate.contenders import MAIN_RUN_TIME
 from mirrorbake.evaluate.evaluate import Onlooker
 from mirrorbake.evaluate.metrics import flip
 from mirrorbake.evaluate.places import View, choose_views
@@ -143,7 +142,7 @@ class Bench:
             seen = onlooker.look(view)
             if seen is None or contender not in seen.pictures:
                 continue
-            light, reference = seen.pictures[contender][MAIN_RUN_TIME], seen.reference
+            light, reference = seen.pictures[contender][seen.run_time], seen.reference
             psnr[view.place] = reference.psnr(light)
             errors[view.place] = flip(
                 reference.images.composite(light), reference.images.beauty, reference.mask

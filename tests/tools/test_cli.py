@@ -417,7 +417,15 @@ def test_the_demonstration_leaves_figures_and_a_contact_sheet(
     assert result.returncode == 0, result.stderr
     assert "half-way between two" in result.stdout
     names = {path.name for path in (tmp_path / "demo").iterdir()}
-    assert names == {"pem.zarr", "metrics.json", "contact-sheet.png", "references"}
+    assert names == {"pem.zarr", "metrics.json", "contact-sheet.png", "references", "viewer"}
+
+
+@pytest.mark.parametrize("view", ["2", "-0.5", "0,0"])
+def test_render_refuses_points_outside_of_the_space(baked: Path, tmp_path: Path, view: str) -> None:
+    result = run("render", baked, "--view", view, "--out", tmp_path / "view.exr")
+    assert result.returncode == 2
+    assert "view" in result.stderr
+    assert not (tmp_path / "view.exr").exists()
 
 
 @pytest.mark.parametrize("name", ["view.exr", "view.png"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -14,13 +15,17 @@ from mirrorbake.commands.options import (
     Threads,
 )
 from mirrorbake.commands.progress import messages
+from mirrorbake.errors import OptionError
 
 
 def _parse_point(text: str) -> tuple[float, ...]:
     try:
-        return tuple(float(part) for part in text.split(",") if text.strip())
+        point = tuple(float(part) for part in text.split(",") if text.strip())
     except ValueError:
-        raise typer.BadParameter(f"{text!r}: expected numbers, separated by commas") from None
+        point = (math.nan,)
+    if not all(math.isfinite(value) for value in point):
+        raise OptionError(f"--view {text}: expected numbers, separated by commas")
+    return point
 
 
 @reports_errors

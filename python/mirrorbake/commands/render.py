@@ -24,7 +24,7 @@ def _parse_point(text: str) -> tuple[float, ...]:
     except ValueError:
         point = (math.nan,)
     if not all(math.isfinite(value) for value in point):
-        raise OptionError(f"--view {text}: expected numbers, separated by commas")
+        raise OptionError(f"view = {text}: expected numbers, separated by commas")
     return point
 
 

@@ -11,6 +11,6 @@ namespace mirrorbake::image_files {
 /// filefmts.pdf): RGBE or XYZE, flat, or run-length encoded in the old or the new way, scan lines of any of
 /// the eight orientations. Its EXPOSURE and COLORCORR are divided out, so that pixels are radiance. Throws
 /// FileError.
-std::unique_ptr<Reader> open_hdr(const std::string& name, std::shared_ptr<const Bytes> bytes);
+std::unique_ptr<Reader> open_hdr(const std::string& name, const Bytes& bytes);
 
 }  // namespace mirrorbake::image_files

@@ -239,8 +239,8 @@ class HdrReader : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> open_hdr(const std::string& name, std::shared_ptr<const Bytes> bytes) {
-  return std::make_unique<HdrReader>(name, *bytes);
+std::unique_ptr<Reader> open_hdr(const std::string& name, const Bytes& bytes) {
+  return std::make_unique<HdrReader>(name, bytes);
 }
 
 }  // namespace mirrorbake::image_files

@@ -108,8 +108,8 @@ std::unique_ptr<Reader> open(const std::string& name, FileKind kind,
   if (!choice.part.empty() || !choice.layer.empty()) {
     throw FileError(name, "has no parts and layers to choose from, expected an EXR file");
   }
-  if (kind == FileKind::hdr) return image_files::open_hdr(name, std::move(bytes));
-  if (kind == FileKind::webp) return image_files::open_webp(name, std::move(bytes));
+  if (kind == FileKind::hdr) return image_files::open_hdr(name, *bytes);
+  if (kind == FileKind::webp) return image_files::open_webp(name, *bytes);
   image_files::Guard guard = image_files::guard_of(name, kind, *bytes);
   return image_files::openimageio().open(name, kind, std::move(bytes), std::move(guard));
 }

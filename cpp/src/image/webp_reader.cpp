@@ -49,8 +49,8 @@ class WebpReader : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> open_webp(const std::string& name, std::shared_ptr<const Bytes> bytes) {
-  return std::make_unique<WebpReader>(name, *bytes);
+std::unique_ptr<Reader> open_webp(const std::string& name, const Bytes& bytes) {
+  return std::make_unique<WebpReader>(name, bytes);
 }
 
 }  // namespace mirrorbake::image_files

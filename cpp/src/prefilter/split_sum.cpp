@@ -48,7 +48,8 @@ std::vector<float> split_sum_table(int size, RoughnessScale roughness) {
   std::vector<float> table(n * n * 3);
   parallel_for(n * n, 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const double rough = (static_cast<double>(i / n) + 0.5) / size;
+      const std::size_t row = i / n;
+      const double rough = (static_cast<double>(row) + 0.5) / size;
       const SplitSum sum = split_sum((static_cast<double>(i % n) + 0.5) / size,
                                      roughness == RoughnessScale::squared ? rough * rough : rough);
       table[3 * i] = static_cast<float>(sum.scale);

@@ -14,8 +14,6 @@
 namespace mirrorbake::tracing {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
 // A rectangle seen from a point, in the rectangle's frame, with the constants of Ureña, Fajardo, King, An
 // Area-Preserving Parametrization for Spherical Rectangles, EGSR 2013. In double: the angles nearly cancel.
 struct SphericalRectangle {

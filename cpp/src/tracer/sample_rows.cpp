@@ -70,8 +70,9 @@ SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, co
 void sort_by_pixel(Row& row) {
   std::vector<std::uint32_t> order(row.samples.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return row.samples.pixel[a] < row.samples.pixel[b];
+  // Samples of a pixel stay in their order.
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(row.samples.pixel[a], a) < std::pair(row.samples.pixel[b], b);
   });
   const auto sort = [&](auto& array) {
     auto sorted = array;

@@ -63,7 +63,7 @@ class ObjScene {
   std::optional<fs::path> existing(const fs::path& from, const std::string& what,
                                    const std::string& reference) {
     std::error_code code;
-    const auto target = resolve_inside(from.parent_path(), reference);
+    auto target = resolve_inside(from.parent_path(), reference);
     if (!target) {
       warnings_.add("the " + what + " '" + reference + "' is not inside the file's own directory");
       return std::nullopt;
@@ -79,7 +79,7 @@ class ObjScene {
     for (const std::string& file : library_files(path_, names)) {
       const auto found = existing(path_, "material library", file);
       if (!found || !libraries_.insert(*found).second) continue;
-      const fs::path library = *found;
+      const fs::path& library = *found;
       const std::string text = read_file(library);
       for (mtl::Definition& definition : mtl::parse(text, warnings_)) {
         const std::string name = definition.name;
@@ -114,7 +114,7 @@ class ObjScene {
                float* largest = nullptr) {
     const auto found = map.file.empty() ? std::nullopt : existing(library, "image", map.file);
     if (!found) return;
-    const fs::path file = *found;
+    const fs::path& file = *found;
     const auto key = std::tuple(file, map.wrap, largest != nullptr);
     const auto it = texture_of_.find(key);
     if (it != texture_of_.end()) {
@@ -135,7 +135,7 @@ class ObjScene {
   void add_opacity(const fs::path& library, const mtl::Map& map, TextureReference& reference) {
     const auto found = map.file.empty() ? std::nullopt : existing(library, "image", map.file);
     if (!found) return;
-    const fs::path file = *found;
+    const fs::path& file = *found;
     const auto [it, is_new] = opacity_of_.try_emplace(std::pair(file, map.wrap), -1);
     if (is_new) {
       const std::string bytes = read_file(file.string());

@@ -91,15 +91,21 @@ def test_includes_follow_the_direction_of_dependencies() -> None:
     assert not violations
 
 
-def test_link_lines_follow_the_direction_of_dependencies() -> None:
-    declared = {}
+def linked_modules() -> dict[str, set[str]]:
+    """Modules that each module links, as its CMakeLists.txt says."""
+    links: dict[str, set[str]] = {}
     for path in (CPP / "src").glob("*/CMakeLists.txt"):
         call = re.search(
             r"mirrorbake_add_module\((\w+)\s(.*?)\)", path.read_text(encoding="utf-8"), re.DOTALL
         )
         assert call, path
         depends = re.search(r"DEPENDS\s+([a-z\s]+)", call[2])
-        declared[call[1]] = set(depends[1].split()) if depends else set()
+        links[call[1]] = set(depends[1].split()) if depends else set()
+    return links
+
+
+def test_link_lines_follow_the_direction_of_dependencies() -> None:
+    declared = linked_modules()
     assert declared["projection"] == {"core"}
     violations = [
         f"{module} links {other}"
@@ -141,14 +147,7 @@ def test_python_imports_go_down_or_stay() -> None:
 
 def test_modules_link_what_they_include() -> None:
     """What a module includes lies in the closure of what it links, so that it builds on its own."""
-    links = {}
-    for path in (CPP / "src").glob("*/CMakeLists.txt"):
-        call = re.search(
-            r"mirrorbake_add_module\((\w+)\s(.*?)\)", path.read_text(encoding="utf-8"), re.DOTALL
-        )
-        assert call, path
-        depends = re.search(r"DEPENDS\s+([a-z\s]+)", call[2])
-        links[call[1]] = set(depends[1].split()) if depends else set()
+    links = linked_modules()
 
     def closure(module: str) -> set[str]:
         return {module}.union(*(closure(other) for other in links[module]))

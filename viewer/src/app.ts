@@ -4,6 +4,7 @@ import { Controls } from "./controls";
 import { UserError } from "./errors";
 import type { Files } from "./files";
 import { listen } from "./gestures";
+import { enterHeadset, hasHeadset } from "./headset";
 import { clamp } from "./math";
 import { Scene } from "./scene";
 import { fromLink, type Settings, toLink } from "./state";
@@ -24,6 +25,7 @@ export class App {
   private lastFrame = 0;
   private meanFrame = 0;
   private lost = false;
+  private headset: XRSession | null = null;
   private linkTimer = 0;
   frames = 0;
 
@@ -36,6 +38,7 @@ export class App {
       coordinate: (axis, value) => this.moveTo(axis, value),
       play: () => this.play(),
       fullscreen: () => this.fullscreen(),
+      headset: () => void this.putOnHeadset(),
       screenshot: () => void this.screenshot(),
       copyLink: () => void this.copyLink(),
       reset: () => this.reset(),
@@ -125,6 +128,7 @@ export class App {
       );
     });
     requestAnimationFrame((now) => this.tick(now));
+    void hasHeadset().then((there) => controls.showHeadset(there));
   }
 
   private makeContext(): WebGL2RenderingContext {
@@ -242,6 +246,30 @@ export class App {
     else void this.controls.root.requestFullscreen?.();
   }
 
+  /// On and off: the same button.
+  private async putOnHeadset(): Promise<void> {
+    const { scene, controls } = this;
+    if (this.headset) {
+      await this.headset.end();
+      return;
+    }
+    if (!scene) return;
+    try {
+      this.headset = await enterHeadset(scene, this.settings, {
+        drawn: () => ++this.frames,
+        ended: () => {
+          this.headset = null;
+          controls.wearsHeadset(false);
+          this.redraw();
+        },
+        failed: (failure) => this.warn(failure),
+      });
+      controls.wearsHeadset(true);
+    } catch (failure) {
+      this.warn(failure);
+    }
+  }
+
   private async screenshot(): Promise<void> {
     this.paint();
     const blob = await new Promise<Blob | null>((resolve) =>
@@ -269,7 +297,7 @@ export class App {
   private tick(now: number): void {
     requestAnimationFrame((next) => this.tick(next));
     const { scene } = this;
-    if (!scene || this.lost) return;
+    if (!scene || this.lost || this.headset) return;
     const elapsed = now - this.lastFrame;
     this.lastFrame = now;
     if (this.playing) this.advance(scene, elapsed / 1000);

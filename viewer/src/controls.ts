@@ -18,6 +18,7 @@ export interface Actions {
   coordinate(axis: number, value: number): void;
   play(): void;
   fullscreen(): void;
+  headset(): void;
   screenshot(): void;
   copyLink(): void;
   reset(): void;
@@ -60,6 +61,7 @@ export class Controls {
   readonly sliders: { axis: number; input: HTMLInputElement }[] = [];
   private readonly footer: HTMLElement;
   readonly playButton: HTMLButtonElement;
+  private readonly headsetButton: HTMLButtonElement;
   readonly fps = element("output", { id: "frame-time", "aria-label": "Frame time" });
   private readonly status = element("div", { class: "status", role: "status", "aria-live": "polite" });
   private readonly bar = element("progress", { max: "1", value: "0", "aria-label": "Loading" });
@@ -71,6 +73,8 @@ export class Controls {
 
   constructor(private readonly actions: Actions) {
     this.playButton = button("play", "Play", () => actions.play());
+    this.headsetButton = button("headset", "Headset", () => actions.headset());
+    this.headsetButton.hidden = true;
     const menu = button("menu", "Settings", () => this.togglePanel());
     menu.setAttribute("aria-controls", "panel");
     menu.setAttribute("aria-expanded", "false");
@@ -176,6 +180,7 @@ export class Controls {
       ]),
       element("div", { class: "buttons" }, [
         button("fullscreen", "Full screen", () => this.actions.fullscreen()),
+        this.headsetButton,
         button("screenshot", "Screenshot", () => this.actions.screenshot()),
         button("link", "Copy link", () => this.actions.copyLink()),
         button("reset", "Reset view", () => this.actions.reset()),
@@ -242,6 +247,14 @@ export class Controls {
   warn(text: string): void {
     this.alert.hidden = text === "";
     this.alert.textContent = text;
+  }
+
+  showHeadset(there: boolean): void {
+    this.headsetButton.hidden = !there;
+  }
+
+  wearsHeadset(on: boolean): void {
+    this.headsetButton.textContent = on ? "Leave the headset" : "Headset";
   }
 
   togglePanel(): void {

@@ -6,7 +6,17 @@ import { UserError } from "./errors";
 import { type Files, textOf } from "./files";
 import { type FrameState, Renderer } from "./gl/renderer";
 import { type Axis, type Manifest, parseManifest, type Vec3 } from "./manifest";
-import { cross, normalize, placeCamera, scale, subtract, type View } from "./math";
+import {
+  add,
+  type ImageWindow,
+  lookAt,
+  type Pose,
+  placeCamera,
+  scale,
+  subtract,
+  type View,
+  windowOf,
+} from "./math";
 import { decodeMesh, type Mesh } from "./mesh";
 import { type Blend, neighbours, nodeCount } from "./space";
 import type { Settings } from "./state";
@@ -57,6 +67,7 @@ export class Scene {
       view: {
         eye: [0, 0, 1],
         forward: [0, 0, -1],
+        middle: [0, 0, -1],
         right: [1, 0, 0],
         down: [0, -1, 0],
         clipFromWorld: new Float32Array(16),
@@ -170,36 +181,63 @@ export class Scene {
 
   draw(s: Settings, width: number, height: number): void {
     if (!s.stereo) {
-      this.renderer.draw(this.frameOf(s, width, height, 0));
+      this.renderer.draw(this.frameOf(s, width, height, this.pose(s), this.window(width / height)));
       return;
     }
+    // Two eyes that look the same way, through windows that meet where the object is: what lies there has no parallax.
     const half = Math.floor(width / 2);
-    this.renderer.draw(this.frameOf(s, half, height, -1), 0);
-    this.renderer.draw(this.frameOf(s, half, height, 1), half);
+    const middle = this.pose(s);
+    for (const side of [-0.5, 0.5]) {
+      const eye = add(middle.eye, scale(side * EYES_APART * s.distance, middle.right));
+      const window = this.window(half / height, -side * EYES_APART);
+      const frame = this.frameOf(s, half, height, { ...middle, eye }, window);
+      this.renderer.draw(frame, null, side < 0 ? 0 : half);
+    }
+  }
+
+  /// One eye's image, of a headset for example, into a part of a framebuffer.
+  drawEye(
+    s: Settings,
+    pose: Pose,
+    window: ImageWindow,
+    framebuffer: WebGLFramebuffer | null,
+    place: { x: number; y: number; width: number; height: number },
+  ): void {
+    const frame = this.frameOf(s, place.width, place.height, pose, window);
+    this.renderer.draw(frame, framebuffer, place.x, place.y);
   }
 
   /// Scene-linear light, and the object's coverage in alpha, from the lower left corner.
   readLinear(s: Settings, width: number, height: number): Float32Array {
-    return this.renderer.readLinear(this.frameOf(s, width, height, 0));
+    return this.renderer.readLinear(
+      this.frameOf(s, width, height, this.pose(s), this.window(width / height)),
+    );
   }
 
-  /// `side`: -1 left eye, 1 right eye, 0 both.
-  private frameOf(s: Settings, width: number, height: number, side: number): FrameState {
+  /// Sets the camera of settings to where an eye is.
+  stand(s: Settings, eye: Vec3): void {
+    const [x, y, z] = subtract(eye, this.manifest.camera.target);
+    s.azimuth = (Math.atan2(x, z) * 180) / Math.PI;
+    s.elevation = (Math.atan2(y, Math.hypot(x, z)) * 180) / Math.PI;
+    s.distance = Math.hypot(x, y, z);
+  }
+
+  pose(s: Settings): Pose {
+    return lookAt(this.eye(s), this.manifest.camera.target);
+  }
+
+  private window(aspect: number, shift = 0): ImageWindow {
+    return windowOf(this.fieldOfView(aspect), aspect, shift);
+  }
+
+  private frameOf(s: Settings, width: number, height: number, pose: Pose, window: ImageWindow): FrameState {
     const { frame } = this;
     const { camera, runTime, mesh } = this.manifest;
-    const fov = this.fieldOfView(width / height);
-    let eye = this.eye(s);
-    let { target } = camera;
-    if (side !== 0) {
-      const right = normalize(cross(subtract(target, eye), [0, 1, 0]));
-      const offset = scale(0.5 * side * EYES_APART * s.distance, right);
-      eye = [eye[0] + offset[0], eye[1] + offset[1], eye[2] + offset[2]];
-      target = [...target];
-    }
     const { low, high } = mesh.bounds;
     const radius = Math.hypot(...subtract(high, low)) + Math.hypot(...(this.manifest.motion?.to ?? [0]));
-    const near = Math.max(s.distance - 2 * radius, 0.01 * s.distance);
-    placeCamera(frame.view as View, eye, target, fov, width, height, near, s.distance + 2 * radius);
+    const distance = Math.hypot(...subtract(pose.eye, camera.target));
+    const near = Math.max(distance - 2 * radius, 0.01 * s.distance);
+    placeCamera(frame.view as View, pose, window, width, height, near, distance + 2 * radius);
     frame.width = width;
     frame.height = height;
     frame.places = s.lookups === 1 ? CENTRE : runTime.places.length === 4 ? runTime.places : GRID;
@@ -222,7 +260,7 @@ export class Scene {
     frame.background = this.hasStatic ? s.background : "plain";
     frame.exposure = 2 ** s.exposure;
     frame.neutral = s.toneMapping === "neutral";
-    const growth = Math.tan(0.5 * fov) / Math.tan((camera.verticalFovDegrees * Math.PI) / 360);
+    const growth = window.top / Math.tan((camera.verticalFovDegrees * Math.PI) / 360);
     frame.stillScale[0] = (growth * width) / height / camera.aspect;
     frame.stillScale[1] = growth;
     return frame;

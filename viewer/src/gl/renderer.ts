@@ -200,16 +200,16 @@ export class Renderer {
     ++this.counters.uploaded;
   }
 
-  /// Draws into the canvas, whose lower left corner is at (x, 0).
-  draw(frame: FrameState, x = 0): void {
+  /// Draws into a framebuffer, or the canvas where it is null; (x, y) is the image's lower left corner there.
+  draw(frame: FrameState, framebuffer: WebGLFramebuffer | null = null, x = 0, y = 0): void {
     const { gl } = this;
     this.drawLinear(frame);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.disable(gl.DEPTH_TEST);
     gl.disable(gl.BLEND);
     gl.enable(gl.SCISSOR_TEST);
-    gl.viewport(x, 0, frame.width, frame.height);
-    gl.scissor(x, 0, frame.width, frame.height);
+    gl.viewport(x, y, frame.width, frame.height);
+    gl.scissor(x, y, frame.width, frame.height);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.targets.sumTexture);
     this.display.use();
@@ -310,7 +310,7 @@ export class Renderer {
     gl.uniform1i(background.at("uAlpha"), 1);
     gl.uniform2f(background.at("uLayer"), 1 / pool.width, 1 / pool.height);
     gl.uniform1i(background.at("uMaxTaps"), 1);
-    gl.uniform3fv(background.at("uForward"), view.forward);
+    gl.uniform3fv(background.at("uMiddle"), view.middle);
     gl.uniform3fv(background.at("uRight"), view.right);
     gl.uniform3fv(background.at("uDown"), view.down);
     gl.uniform2f(background.at("uPixels"), frame.width, frame.height);

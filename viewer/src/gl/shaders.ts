@@ -192,8 +192,8 @@ in vec3 vDiffuse;
 out vec4 oColour;
 ${READS}
 uniform vec3 uEye;
-uniform vec3 uForward;  // the image plane at distance 1
-uniform vec3 uRight;    // one pixel to the right on it
+uniform vec3 uForward;  // normal of the image plane
+uniform vec3 uRight;    // one pixel to the right on the plane at distance 1
 uniform vec3 uDown;     // one pixel down
 uniform float uFootprint;
 uniform bool uFlat;
@@ -382,7 +382,7 @@ export const BACKGROUND_FRAGMENT = `${HEADER}
 in vec2 vUv;
 out vec4 oColour;
 ${READS}
-uniform vec3 uForward;
+uniform vec3 uMiddle;
 uniform vec3 uRight;
 uniform vec3 uDown;
 uniform vec2 uPixels;
@@ -403,7 +403,7 @@ void main() {
     return;
   }
   vec2 pixel = vec2(gl_FragCoord.x, uPixels.y - gl_FragCoord.y) - 0.5 + uPlace;
-  vec3 d = uForward + (pixel.x - 0.5 * uPixels.x) * uRight + (pixel.y - 0.5 * uPixels.y) * uDown;
+  vec3 d = uMiddle + (pixel.x - 0.5 * uPixels.x) * uRight + (pixel.y - 0.5 * uPixels.y) * uDown;
   vec3 h = leave(uShape, uEye, d, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);
   vec3 hx = leave(uShape, uEye, d + uRight, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);
   vec3 hy = leave(uShape, uEye, d + uDown, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);

@@ -160,12 +160,14 @@ void bind_envmap(nb::module_& m) {
   m.def(
       "sample",
       [](const EnvMapLayout& layout, FloatArray values, PointArray directions, std::optional<PointArray> ddx,
-         std::optional<PointArray> ddy, const std::string& filter, double max_anisotropy) {
+         std::optional<PointArray> ddy, const std::string& filter, std::optional<FloatArray> level,
+         double bias, double max_anisotropy) {
         const auto vectors = [](const PointArray& a) {
           return std::span(reinterpret_cast<const glm::vec3*>(a.data()), a.shape(0));
         };
         const std::span<const glm::vec3> none;
-        const SampleOptions options{parse_sample_filter(filter), max_anisotropy};
+        SampleOptions options{parse_sample_filter(filter), max_anisotropy, bias};
+        if (level) options.level = {level->data(), level->size()};
         std::vector<float> result(directions.shape(0) * static_cast<std::size_t>(layout.channels));
         {
           nb::gil_scoped_release released;
@@ -180,9 +182,10 @@ void bind_envmap(nb::module_& m) {
         return to_numpy(std::move(result), {directions.shape(0), static_cast<std::size_t>(layout.channels)});
       },
       nb::arg("layout"), nb::arg("values"), nb::arg("directions"), nb::arg("ddx") = nb::none(),
-      nb::arg("ddy") = nb::none(), nb::arg("filter") = "bilinear", nb::arg("max_anisotropy") = 16.0,
-      "Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials (n, "
-      "3).");
+      nb::arg("ddy") = nb::none(), nb::arg("filter") = "bilinear", nb::arg("level") = nb::none(),
+      nb::arg("bias") = 0.0, nb::arg("max_anisotropy") = 16.0,
+      "Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials\n"
+      "(n, 3), or trilinear at levels, one or n of them.");
   m.def(
       "quad_differentials",
       [](FloatImage directions) {

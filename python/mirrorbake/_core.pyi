@@ -1380,9 +1380,10 @@ def add_border(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], d
     Faces of a level with a border of their neighbours' texels: (faces, height, width, channels).
     """
 
-def sample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], ddx: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, ddy: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, filter: str = 'bilinear', max_anisotropy: float = 16.0) -> NDArray[numpy.float32]:
+def sample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], ddx: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, ddy: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, filter: str = 'bilinear', level: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)] | None = None, bias: float = 0.0, max_anisotropy: float = 16.0) -> NDArray[numpy.float32]:
     """
-    Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials (n, 3).
+    Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials
+    (n, 3), or trilinear at levels, one or n of them.
     """
 
 def quad_differentials(directions: NDArray[numpy.float32]) -> tuple[NDArray[numpy.float32], NDArray[numpy.float32]]:

@@ -14,7 +14,6 @@ Examples
 from __future__ import annotations
 
 from dataclasses import dataclass
-from operator import index
 from os import fspath
 from typing import TYPE_CHECKING
 
@@ -23,6 +22,7 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.arrays import real_array
 from mirrorbake.projection import vectors
+from mirrorbake.resample import Resampler, make_resampler, resampled
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["EnvMap", "Resampler"]
 
-_MAX_SIDE = 65536  # texels, as in C++
 _NAMES = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}
 
 
@@ -195,8 +194,8 @@ class EnvMap:
             For unknown names, sizes that are not 1 to 65536 or do not fit the projection, and matrices that
             are not orthonormal.
         """
-        resampler = _resampler(self.layout, projection, size, filter, source_from_target, 0)
-        return _resampled(resampler, self)
+        resampler = make_resampler(self.layout, projection, size, filter, source_from_target, 0)
+        return resampled(resampler, self)
 
     def mips(self, filter: str = "seamless") -> EnvMap:
         """All levels down to 1×1, by ``box``, ``solid_angle`` or ``seamless``; else InvalidArgument."""
@@ -227,22 +226,60 @@ class EnvMap:
         ddy: ArrayLike | None = None,
         *,
         filter: str = "bilinear",
+        level: ArrayLike | None = None,
+        bias: float = 0.0,
         max_anisotropy: float = 16.0,
     ) -> NDArray[np.float32]:
-        """Values (..., C) in directions (..., 3).
+        """Values (..., C) in directions (..., 3), read across the edges of faces.
 
-        ``trilinear`` and ``ewa`` need the differentials of the directions over a pixel, of the same shape.
+        Parameters
+        ----------
+        directions
+            Shape (..., 3), of any length above 0.
+        ddx, ddy
+            Differentials of the directions over a pixel, of the same shape: ``trilinear`` and ``ewa`` need
+            them.
+        filter
+            ``nearest`` and ``bilinear`` read the finest level; ``trilinear`` the two whose texels are next in
+            size to the longer differential; ``ewa`` averages an ellipse.
+        level
+            Of ``trilinear``, instead of differentials: the level of detail itself, a number or an array that
+            broadcasts to the shape (...). Levels that do not exist count as the nearest that does.
+        bias
+            Added to the level of detail, as a renderer's bias for gloss is: of ``trilinear`` and ``ewa``,
+            whose differentials grow by the factor 2^bias; -64 to 64.
+        max_anisotropy
+            Of ``ewa``: longer ellipses are widened to this ratio, at least 1.
 
         Raises
         ------
         InvalidArgument
-            For NaN, infinite and zero directions, for missing differentials, and for other shapes.
+            For NaN, infinite and zero directions, for missing differentials, for options that contradict each
+            other, and for other shapes.
+
+        Examples
+        --------
+        >>> step = np.zeros((6, 2, 2, 1), np.float32)
+        >>> step[0] = 1.0  # the face of +x
+        >>> cube = EnvMap.from_array(step, "cube").mips("solid_angle")
+        >>> cube.sample([1.0, 0.0, 0.0], filter="trilinear", level=1.0).tolist()
+        [1.0]
         """
         array = vectors("directions", directions, 3)
 
         def differentials(name: str, a: ArrayLike | None) -> NDArray[np.float32] | None:
             return None if a is None else np.broadcast_to(vectors(name, a, 3), array.shape).reshape(-1, 3)
 
+        levels = None
+        if level is not None:
+            given = real_array("level", level, np.float32)
+            try:
+                given = given if given.ndim == 0 else np.broadcast_to(given, array.shape[:-1])
+            except ValueError:
+                raise _core.InvalidArgument(
+                    f"level has the shape {given.shape}, expected a number, or {array.shape[:-1]}"
+                ) from None
+            levels = np.ascontiguousarray(given).reshape(-1)
         values = _core.sample(
             self.layout,
             self.values,
@@ -250,6 +287,8 @@ class EnvMap:
             differentials("ddx", ddx),
             differentials("ddy", ddy),
             filter,
+            levels,
+            bias,
             max_anisotropy,
         )
         return values.reshape((*array.shape[:-1], self.layout.channels))
@@ -273,96 +312,3 @@ class EnvMap:
     def compare(self, reference: EnvMap) -> _core.Comparison:
         """Errors of the finest level against a reference; InvalidArgument unless its layout is the same."""
         return _core.compare_envmaps(self.layout, self.values, reference.layout, reference.values)
-
-
-class Resampler:
-    """Resamples maps of one projection and size, such as the frames of a film.
-
-    It finds once what every texel of the target is made from, which is most of the work, and keeps it.
-    `apply` gives the same bits as `EnvMap.resample`.
-
-    Parameters
-    ----------
-    source
-        A map, or the layout of one: the projection and size of those to come, of any number of channels.
-    projection, size, filter, source_from_target
-        As for `EnvMap.resample`.
-    max_bytes
-        Keep at most so much; what does not fit is found again every time. Typical are 5 bytes for each texel
-        of the source that a texel of the target reads, divided by the symmetries that both maps share: 16
-        between a panorama and a cube, 1 if they are turned against each other.
-
-    Examples
-    --------
-    >>> frames = [EnvMap.from_array(np.full((64, 128, 3), i, np.float32), "latlong") for i in range(3)]
-    >>> to_cube = Resampler(frames[0], "cube", 32)
-    >>> [round(float(to_cube.apply(frame).values.max()), 5) for frame in frames]
-    [0.0, 1.0, 2.0]
-    """
-
-    def __init__(
-        self,
-        source: EnvMap | _core.EnvMapLayout,
-        projection: str,
-        size: int | tuple[int, int],
-        *,
-        filter: str = "automatic",
-        source_from_target: ArrayLike | None = None,
-        max_bytes: int = 1 << 30,
-    ) -> None:
-        layout = source.layout if isinstance(source, EnvMap) else source
-        self._resampler = _resampler(layout, projection, size, filter, source_from_target, max_bytes)
-
-    def apply(self, envmap: EnvMap) -> EnvMap:
-        """Return the finest level in the projection and size of the target.
-
-        Raises
-        ------
-        InvalidArgument
-            If the map has another projection or size than the resampler was made for.
-        """
-        return _resampled(self._resampler, envmap)
-
-    @property
-    def bytes(self) -> int:
-        """Memory of what is kept."""
-        return self._resampler.bytes
-
-
-def height_and_width(projection: str, size: int | tuple[int, int]) -> tuple[int, int]:
-    try:
-        if isinstance(size, tuple | list):
-            height, width = (index(side) for side in size)
-        else:
-            height = index(size)
-            width = 2 * height if projection == "latlong" else height
-    except (TypeError, ValueError):
-        raise _core.InvalidArgument(f"size is {size!r}, expected a height, or (height, width)") from None
-    if max(height, width) > _MAX_SIDE:
-        raise _core.InvalidArgument(f"size is {size!r}, expected 1 to {_MAX_SIDE} texels a side")
-    return height, width
-
-
-def _resampler(
-    source: _core.EnvMapLayout,
-    projection: str,
-    size: int | tuple[int, int],
-    filter: str,
-    source_from_target: ArrayLike | None,
-    max_bytes: int,
-) -> _core.Resampler:
-    height, width = height_and_width(projection, size)
-    matrix = np.eye(3, dtype=np.float32) if source_from_target is None else source_from_target
-    matrix = np.ascontiguousarray(real_array("source_from_target", matrix, np.float32))
-    if matrix.shape != (3, 3):
-        raise _core.InvalidArgument(f"source_from_target has shape {matrix.shape}, expected (3, 3)")
-    if max_bytes < 0:
-        raise _core.InvalidArgument(f"max_bytes is {max_bytes}, expected 0 or more")
-    return _core.Resampler(source, projection, width, height, filter, matrix, max_bytes)
-
-
-def _resampled(resampler: _core.Resampler, envmap: EnvMap) -> EnvMap:
-    layout = resampler.layout(envmap.layout.channels)
-    values = np.empty(layout.size, np.float32)  # NumPy asks for large pages; they take a tenth of the time
-    resampler.apply(envmap.layout, envmap.values, values)
-    return EnvMap(layout, values, envmap.channels)

@@ -121,6 +121,22 @@ def test_lookups_refuse_what_has_no_answer() -> None:
     assert envmap.sample(np.ones((2, 5, 3))).shape == (2, 5, 3)
 
 
+def test_levels_broadcast_to_the_directions_and_a_bias_adds_to_them() -> None:
+    mips = EnvMap.from_array(np.zeros((6, 4, 4, 1), np.float32), "cube").mips()
+    for level in range(3):
+        mips.level(level)[:] = level
+    directions = np.ones((2, 3, 3), np.float32)
+    rows = mips.sample(directions, filter="trilinear", level=[[0.5], [1.5]])[..., 0]
+    np.testing.assert_allclose(rows, [[0.5] * 3, [1.5] * 3])
+    assert mips.sample([0, 0, 1], filter="trilinear", level=0.5, bias=0.75)[0] == 1.25
+    with pytest.raises(_core.InvalidArgument, match=r"level has the shape \(5,\), expected a number, or \(2, 3\)"):
+        mips.sample(directions, filter="trilinear", level=np.zeros(5))
+    with pytest.raises(_core.InvalidArgument, match="level is given, expected none, or the filter trilinear"):
+        mips.sample(directions, level=0.0)
+    with pytest.raises(_core.InvalidArgument, match="bias is nan"):
+        mips.sample(directions, filter="trilinear", level=0.0, bias=float("nan"))
+
+
 def test_borders_surround_the_faces() -> None:
     envmap = noise("latlong", 8)
     wide = envmap.with_border(2)

@@ -30,37 +30,37 @@ void reduce(EnvMap& map, int level, const std::vector<double>& weights) {
   const std::size_t channels = static_cast<std::size_t>(layout.channels);
   const std::size_t lines = static_cast<std::size_t>(face_count(layout.projection) * height);
   parallel_for(lines, 16, [&](std::size_t begin, std::size_t end) {
-    std::vector<double> weighted(channels);
-    std::vector<double> plain(channels);
+    std::vector<double> sum(channels);
     for (std::size_t line = begin; line < end; ++line) {
       const int face = static_cast<int>(line) / height;
       const int row = static_cast<int>(line) % height;
       const Children rows = children(row, height, fine_height);
       for (int column = 0; column < width; ++column) {
         const Children columns = children(column, width, fine_width);
-        std::fill(weighted.begin(), weighted.end(), 0.0);
-        std::fill(plain.begin(), plain.end(), 0.0);
-        double weight = 0.0;
-        for (int y = rows.begin; y < rows.end; ++y) {
-          for (int x = columns.begin; x < columns.end; ++x) {
-            const double w =
-                weights.empty() ? 1.0
-                                : weights[static_cast<std::size_t>(y) * static_cast<std::size_t>(fine_width) +
-                                          static_cast<std::size_t>(x)];
-            const float* texel = map.values.data() + layout.index(level - 1, face, y, x);
-            weight += w;
-            for (std::size_t c = 0; c < channels; ++c) {
-              weighted[c] += w > 0.0 ? w * static_cast<double>(texel[c]) : 0.0;
-              plain[c] += static_cast<double>(texel[c]);
+        // Adds up the fine texels, each times weight_of(row, column); returns the sum of the weights.
+        const auto add_up = [&](const auto& weight_of) {
+          std::fill(sum.begin(), sum.end(), 0.0);
+          double weight = 0.0;
+          for (int y = rows.begin; y < rows.end; ++y) {
+            const float* texel = map.values.data() + layout.index(level - 1, face, y, columns.begin);
+            for (int x = columns.begin; x < columns.end; ++x, texel += channels) {
+              const double w = weight_of(y, x);
+              if (!(w > 0.0)) continue;
+              weight += w;
+              for (std::size_t c = 0; c < channels; ++c) sum[c] += w * static_cast<double>(texel[c]);
             }
           }
-        }
+          return weight;
+        };
+        const auto alike = [](int, int) { return 1.0; };
+        double weight = weights.empty() ? add_up(alike) : add_up([&](int y, int x) {
+          return weights[static_cast<std::size_t>(y) * static_cast<std::size_t>(fine_width) +
+                         static_cast<std::size_t>(x)];
+        });
         // Outside of the disc of a round map texels have no solid angle; they are kept for filtering.
-        const double count = (rows.end - rows.begin) * (columns.end - columns.begin);
+        if (weight == 0.0) weight = add_up(alike);
         float* texel = map.values.data() + layout.index(level, face, row, column);
-        for (std::size_t c = 0; c < channels; ++c) {
-          texel[c] = static_cast<float>(weight > 0.0 ? weighted[c] / weight : plain[c] / count);
-        }
+        for (std::size_t c = 0; c < channels; ++c) texel[c] = static_cast<float>(sum[c] / weight);
       }
     }
   });
@@ -137,8 +137,7 @@ EnvMap build_mips(const EnvMapView& map, MipFilter filter) {
   const std::span<const float> finest = map.level(0);
   std::copy(finest.begin(), finest.end(), result.values.begin());
   const bool weighted = filter != MipFilter::box;
-  const std::vector<double> flux = weighted ? integrate(map) : std::vector<double>();
-  bool odd = false;
+  std::vector<double> flux;  // of the finest level, once an odd side did not keep it
   for (int level = 1; level < layout.levels; ++level) {
     const int fine_width = layout.level_width(level - 1);
     const int fine_height = layout.level_height(level - 1);
@@ -146,8 +145,9 @@ EnvMap build_mips(const EnvMapView& map, MipFilter filter) {
            weighted ? texel_solid_angles(layout.projection, fine_width, fine_height) : std::vector<double>());
     if (filter == MipFilter::seamless && layout.projection.kind == ProjectionKind::cube)
       share_edges(result, level);
-    odd = odd || (fine_width > 1 && fine_width % 2 != 0) || (fine_height > 1 && fine_height % 2 != 0);
-    if (weighted && odd) restore_mean(result, level, flux);
+    const bool odd = (fine_width > 1 && fine_width % 2 != 0) || (fine_height > 1 && fine_height % 2 != 0);
+    if (weighted && odd && flux.empty()) flux = integrate(map);
+    if (!flux.empty()) restore_mean(result, level, flux);
   }
   return result;
 }

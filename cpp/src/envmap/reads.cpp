@@ -9,6 +9,7 @@
 #include <glm/vec2.hpp>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/envmap/texel_lookup.hpp"
 #include "mirrorbake/projection/cube.hpp"
 
 namespace mirrorbake {
@@ -146,52 +147,30 @@ void add_bilinear(const TexelTopology& topology, int level, glm::vec3 direction,
   const int width = topology.width(level);
   const int height = topology.height(level);
   const FacePoint p = face_point(topology.kind(), direction);
-  const float x = std::clamp(p.s * static_cast<float>(width) - 0.5F, -0.5F, static_cast<float>(width) - 0.5F);
-  const float y =
-      std::clamp(p.t * static_cast<float>(height) - 0.5F, -0.5F, static_cast<float>(height) - 0.5F);
-  const int column = static_cast<int>(std::floor(x));
-  const int row = static_cast<int>(std::floor(y));
-  const float fx = x - static_cast<float>(column);
-  const float fy = y - static_cast<float>(row);
-  const float weights[4] = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
-
-  if (row >= 0 && column >= 0 && row + 1 < height && column + 1 < width) {
-    const std::uint32_t first = topology.index({level, p.face, row, column});
+  const BilinearCell<float> cell = bilinear_cell(std::clamp(p.s, 0.0F, 1.0F) * static_cast<float>(width),
+                                                 std::clamp(p.t, 0.0F, 1.0F) * static_cast<float>(height));
+  if (cell.inside(width, height)) {
+    const std::uint32_t first = topology.index({level, p.face, cell.row, cell.column});
     const std::uint32_t below = first + static_cast<std::uint32_t>(width);
+    const std::array<float, 4> weights = cell.weights();
     reads.add(first, scale * weights[0]);
     reads.add(first + 1, scale * weights[1]);
     reads.add(below, scale * weights[2]);
     reads.add(below + 1, scale * weights[3]);
     return;
   }
-
-  const int first = reads.count;
-  float missing = 0.0F;  // weight of the texel that a corner of the cube lacks
-  for (int i = 0; i < 4; ++i) {
-    const int r = row + i / 2;
-    const int c = column + i % 2;
-    const bool at_corner = (r < 0 || r >= height) && (c < 0 || c >= width);
-    if (at_corner && topology.kind() == TopologyKind::cube) {
-      missing = weights[i];
-    } else if (topology.kind() == TopologyKind::cube) {
-      reads.add(topology.texel_at({level, p.face, r, c}), scale * weights[i]);
-    } else {
-      reads.add(topology.index({level, p.face, std::clamp(r, 0, height - 1), std::clamp(c, 0, width - 1)}),
-                scale * weights[i]);
-    }
-  }
-  if (missing > 0.0F) {
-    for (int i = first; i < reads.count; ++i) {
-      reads.texels[static_cast<std::size_t>(i)].weight += scale * missing / 3.0F;
-    }
-  }
+  const bool cube = topology.kind() == TopologyKind::cube;
+  add_face_bilinear(cell, width, height, cube, scale, [&](int row, int column, float weight) {
+    reads.add(cube ? topology.texel_at({level, p.face, row, column})
+                   : topology.index(
+                         {level, p.face, std::clamp(row, 0, height - 1), std::clamp(column, 0, width - 1)}),
+              weight);
+  });
 }
 
 void add_trilinear(const TexelTopology& topology, float level, glm::vec3 direction, float scale,
                    TexelReads& reads) {
-  const float clamped = std::clamp(level, 0.0F, static_cast<float>(topology.levels() - 1));
-  const int finer = static_cast<int>(clamped);
-  const float fraction = clamped - static_cast<float>(finer);
+  const auto [finer, fraction] = level_pair(level, topology.levels());
   add_bilinear(topology, finer, direction, scale * (1.0F - fraction), reads);
   if (fraction > 0.0F) add_bilinear(topology, finer + 1, direction, scale * fraction, reads);
 }

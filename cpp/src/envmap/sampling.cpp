@@ -20,6 +20,8 @@
 namespace mirrorbake {
 namespace {
 
+constexpr double kMostBias = 64.0;
+
 // Change of the position in texels of the finest level that a change of the direction causes.
 struct TexelDifferentials {
   glm::dvec2 dx, dy;
@@ -99,9 +101,7 @@ struct Sampler {
 
   template <typename Lookup>
   void between_levels(double lod, Lookup&& lookup) {
-    const double clamped = std::clamp(lod, 0.0, static_cast<double>(map.layout.levels - 1));
-    const int level = static_cast<int>(clamped);
-    const double fraction = clamped - level;
+    const auto [level, fraction] = level_pair(lod, map.layout.levels);
     lookup(level, value);
     if (fraction == 0.0) return;
     lookup(level + 1, part);
@@ -109,10 +109,13 @@ struct Sampler {
       value[c] = (1.0 - fraction) * value[c] + fraction * part[c];
   }
 
+  void at_level(const MapPoint& point, double lod) {
+    between_levels(lod, [&](int level, std::vector<double>& result) { bilinear(point, level, result); });
+  }
+
   void trilinear(const MapPoint& point, const TexelDifferentials& d) {
     const double longest = std::sqrt(std::max(glm::dot(d.dx, d.dx), glm::dot(d.dy, d.dy)));
-    between_levels(longest > 1.0 ? std::log2(longest) : 0.0,
-                   [&](int level, std::vector<double>& result) { bilinear(point, level, result); });
+    at_level(point, longest > 1.0 ? std::log2(longest) : 0.0);
   }
 
   void ewa(const MapPoint& point, TexelDifferentials d) {
@@ -130,7 +133,7 @@ struct Sampler {
     }
     const double lod = minor > 1.0 ? std::log2(minor) : 0.0;
     if (lod >= map.layout.levels - 1) {
-      between_levels(lod, [&](int level, std::vector<double>& result) { bilinear(point, level, result); });
+      at_level(point, lod);
       return;
     }
     between_levels(lod, [&](int level, std::vector<double>& result) {
@@ -221,27 +224,50 @@ std::size_t sample_bilinear(const EnvMapView& map, PositionLoop positions,
       std::fill_n(result, channels, 0.0F);
       continue;
     }
-    const double column = x[i] - 0.5;
-    const double row = y[i] - 0.5;
-    if (column < 0.0 || row < 0.0 || column >= layout.width - 1 || row >= layout.height - 1) {
+    const BilinearCell<double> cell = bilinear_cell(x[i], y[i]);
+    if (!cell.inside(layout.width, layout.height)) {
       interpolate(map, 0, face[i], x[i], y[i], value);
       for (std::size_t c = 0; c < channels; ++c) result[c] = static_cast<float>(value[c]);
       continue;
     }
-    const int left = static_cast<int>(column);
-    const int top = static_cast<int>(row);
-    const double fx = column - left;
-    const double fy = row - top;
     const float* a = map.values.data() + static_cast<std::size_t>(face[i]) * face_values +
-                     static_cast<std::size_t>(top) * line + static_cast<std::size_t>(left) * channels;
+                     static_cast<std::size_t>(cell.row) * line +
+                     static_cast<std::size_t>(cell.column) * channels;
     const float* b = a + line;
     for (std::size_t c = 0; c < channels; ++c) {
-      const double above = (1.0 - fx) * static_cast<double>(a[c]) + fx * static_cast<double>(a[c + channels]);
-      const double below = (1.0 - fx) * static_cast<double>(b[c]) + fx * static_cast<double>(b[c + channels]);
-      result[c] = static_cast<float>((1.0 - fy) * above + fy * below);
+      result[c] =
+          static_cast<float>(cell.mix(static_cast<double>(a[c]), static_cast<double>(a[c + channels]),
+                                      static_cast<double>(b[c]), static_cast<double>(b[c + channels])));
     }
   }
   return unusable;
+}
+
+bool takes_differentials(SampleFilter filter) {
+  return filter == SampleFilter::trilinear || filter == SampleFilter::ewa;
+}
+
+void check(const SampleOptions& options, std::size_t directions) {
+  if (!(options.max_anisotropy >= 1.0)) {
+    throw InvalidArgument("max_anisotropy", text_of(options.max_anisotropy), "at least 1");
+  }
+  if (!(std::abs(options.bias) <= kMostBias)) {
+    throw InvalidArgument("bias", text_of(options.bias), "-64 to 64");
+  }
+  if (options.bias != 0.0 && !takes_differentials(options.filter)) {
+    throw InvalidArgument("bias", text_of(options.bias), "0, or the filter trilinear or ewa");
+  }
+  if (options.level.empty()) return;
+  if (options.filter != SampleFilter::trilinear) {
+    throw InvalidArgument("level", "given", "none, or the filter trilinear");
+  }
+  if (options.level.size() != 1 && options.level.size() != directions) {
+    throw InvalidArgument("level", std::to_string(options.level.size()) + " numbers",
+                          "1, or one for each of " + std::to_string(directions) + " directions");
+  }
+  for (const float level : options.level) {
+    if (std::isnan(level)) throw InvalidArgument("level", text_of(level), "a number");
+  }
 }
 
 }  // namespace
@@ -263,15 +289,13 @@ std::size_t sample(const EnvMapView& map, std::span<const glm::vec3> directions,
     throw InvalidArgument("values", std::to_string(values.size()) + " numbers",
                           std::to_string(directions.size() * channels));
   }
-  const bool needs_differentials =
-      options.filter == SampleFilter::trilinear || options.filter == SampleFilter::ewa;
+  check(options, directions.size());
+  const bool needs_differentials = takes_differentials(options.filter) && options.level.empty();
   if (needs_differentials && (ddx.size() != directions.size() || ddy.size() != directions.size())) {
     throw InvalidArgument("ddx, ddy", "of another length",
                           std::to_string(directions.size()) + " differentials each");
   }
-  if (!(options.max_anisotropy >= 1.0)) {
-    throw InvalidArgument("max_anisotropy", text_of(options.max_anisotropy), "at least 1");
-  }
+  const double growth = std::exp2(options.bias);
   std::atomic<std::size_t> unusable{0};
   const PositionLoop positions =
       options.filter == SampleFilter::bilinear ? position_loop(map.layout.projection.kind) : nullptr;
@@ -294,12 +318,20 @@ std::size_t sample(const EnvMapView& map, std::span<const glm::vec3> directions,
       }
       TexelDifferentials differentials{};
       if (needs_differentials) {
-        differentials = texel_differentials(map.layout, point, d, glm::dvec3(ddx[i]), glm::dvec3(ddy[i]));
+        differentials = texel_differentials(map.layout, point, d, growth * glm::dvec3(ddx[i]),
+                                            growth * glm::dvec3(ddy[i]));
       }
       switch (options.filter) {
         case SampleFilter::nearest: sampler.nearest(point); break;
         case SampleFilter::bilinear: sampler.bilinear(point, 0, sampler.value); break;
-        case SampleFilter::trilinear: sampler.trilinear(point, differentials); break;
+        case SampleFilter::trilinear:
+          if (needs_differentials) {
+            sampler.trilinear(point, differentials);
+          } else {
+            const float level = options.level[options.level.size() == 1 ? 0 : i];
+            sampler.at_level(point, static_cast<double>(level) + options.bias);
+          }
+          break;
         case SampleFilter::ewa: sampler.ewa(point, differentials); break;
       }
       for (std::size_t c = 0; c < channels; ++c) result[c] = static_cast<float>(sampler.value[c]);

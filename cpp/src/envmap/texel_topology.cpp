@@ -5,6 +5,7 @@
 #include <string>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/envmap/texel_lookup.hpp"
 #include "mirrorbake/projection/projection.hpp"
 
 namespace mirrorbake {
@@ -65,13 +66,8 @@ std::uint32_t TexelTopology::texel_at(const TexelPlace& place) const {
   if (kind_ == TopologyKind::atlas) {
     return index({place.level, 0, std::clamp(place.row, 0, h - 1), std::clamp(place.column, 0, w - 1)});
   }
-  // The direction of the missing texel's centre, seen from the neighbouring face, is shifted along the edge
-  // by less than half a texel, so that it still falls into the texel across the edge.
-  const Projection projection = projection_of(kind_);
-  const MapPoint point = point_from_direction(
-      projection,
-      direction_from_point(projection, place.face, column_center(place.column, w), row_center(place.row, h)));
-  return index({place.level, point.face, texel_index(-point.y, h), texel_index(point.x, w)});
+  const FaceTexel texel = continued(projection_of(kind_), w, h, {place.face, place.row, place.column});
+  return index({place.level, texel.face, texel.row, texel.column});
 }
 
 std::array<std::uint32_t, 4> TexelTopology::neighbours(std::uint32_t texel) const {

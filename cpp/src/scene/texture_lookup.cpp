@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mirrorbake/core/bilinear.hpp"
 #include "mirrorbake/scene/scene.hpp"
 
 namespace mirrorbake {
@@ -37,20 +38,18 @@ glm::vec2 texture_coordinates(const TextureReference& reference, glm::vec2 uv) {
 glm::vec3 texture_lookup(const Texture& texture, glm::vec2 uv) {
   if (texture.file) return texture.file->lookup(uv, 0.0F, texture.wrap_u, texture.wrap_v);
   const Image& image = texture.image;
-  const float x = wrapped(uv.x, texture.wrap_u) * static_cast<float>(image.width) - 0.5F;
-  const float y = (1.0F - wrapped(uv.y, texture.wrap_v)) * static_cast<float>(image.height) - 0.5F;
-  const int x0 = static_cast<int>(std::floor(x));
-  const int y0 = static_cast<int>(std::floor(y));
-  const float fx = x - static_cast<float>(x0);
-  const float fy = y - static_cast<float>(y0);
+  const BilinearCell<float> cell =
+      bilinear_cell(wrapped(uv.x, texture.wrap_u) * static_cast<float>(image.width),
+                    (1.0F - wrapped(uv.y, texture.wrap_v)) * static_cast<float>(image.height));
+  const int x = cell.column;
+  const int y = cell.row;
   const bool is_grey = image.channels.size() == 1;
   const auto texel = [&](int i, int j) {
     const float* p =
         image.at(wrapped(i, image.width, texture.wrap_u), wrapped(j, image.height, texture.wrap_v));
     return is_grey ? glm::vec3(*p) : glm::vec3(p[0], p[1], p[2]);
   };
-  return (1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
-         fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
+  return cell.mix(texel(x, y), texel(x + 1, y), texel(x, y + 1), texel(x + 1, y + 1));
 }
 
 glm::vec3 texture_mean(const Texture& texture) {

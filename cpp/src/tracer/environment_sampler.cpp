@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "cdf.hpp"
+#include "mirrorbake/core/bilinear.hpp"
 #include "surface.hpp"
 
 namespace mirrorbake::tracing {
@@ -71,20 +72,17 @@ EnvironmentSampler::Distribution EnvironmentSampler::distribution(const std::vec
 glm::vec3 EnvironmentSampler::radiance(glm::vec2 uv) const {
   const int width = panorama_->width;
   const int height = panorama_->height;
-  const float x = uv.x * static_cast<float>(width) - 0.5F;
-  const float y = uv.y * static_cast<float>(height) - 0.5F;
-  const auto x0 = static_cast<int>(std::floor(x));
-  const auto y0 = static_cast<int>(std::floor(y));
-  const float fx = x - static_cast<float>(x0);
-  const float fy = y - static_cast<float>(y0);
+  const BilinearCell<float> cell =
+      bilinear_cell(uv.x * static_cast<float>(width), uv.y * static_cast<float>(height));
+  const int x = cell.column;
+  const int y = cell.row;
   const auto texel = [&](int i, int j) {
     if (i < 0) i += width;
     if (i >= width) i -= width;
     const float* p = panorama_->at(i, std::clamp(j, 0, height - 1));
     return glm::vec3(p[0], p[1], p[2]);
   };
-  return scale_ * ((1.0F - fy) * ((1.0F - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
-                   fy * ((1.0F - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1)));
+  return scale_ * cell.mix(texel(x, y), texel(x + 1, y), texel(x, y + 1), texel(x + 1, y + 1));
 }
 
 float EnvironmentSampler::pdf(const Distribution& d, int x, int y) const {

@@ -8,8 +8,9 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.arrays import real_array
-from mirrorbake.envmap import EnvMap, height_and_width
+from mirrorbake.envmap import EnvMap
 from mirrorbake.projection import vectors
+from mirrorbake.resample import height_and_width
 
 if TYPE_CHECKING:
     from collections.abc import Callable

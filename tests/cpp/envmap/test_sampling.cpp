@@ -14,6 +14,7 @@
 #include "mirrorbake/core/sampling.hpp"
 #include "mirrorbake/envmap/footprint.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
+#include "mirrorbake/envmap/reads.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -132,6 +133,106 @@ TEST(Sampling, HostileDirectionsGiveZeroAndAreCounted) {
   std::vector<float> values(5);
   EXPECT_THROW(sample(map, d, {}, {}, {SampleFilter::ewa}, values), InvalidArgument);
   EXPECT_THROW(sample(map, d, {}, {}, {SampleFilter::nearest}, std::span(values).first(4)), InvalidArgument);
+}
+
+// The loop for many directions and the double precision of `sample` against `reads`, in float: they differ by
+// rounding of the place on a face, times the step between texels of a random map. Beyond the
+// sheet of a paraboloid `sample` goes on to the other hemisphere, where `reads` repeats the edge: directions
+// near the rim, and levels whose texels reach there, are left out.
+TEST(Sampling, IsTheSumOfWhatReadsReads) {
+  for (const bool is_cube : {true, false}) {
+    const char* name = is_cube ? "cube" : "dual_paraboloid";
+    EnvMap finest = make_map(name, 32, 32, [](glm::dvec3) { return 0.0; });
+    finest.layout.levels = 1;
+    finest.values.resize(finest.layout.size());
+    for (std::size_t i = 0; i < finest.values.size(); ++i)
+      finest.values[i] = unit_float(static_cast<std::uint32_t>(hash64(i)));
+    const EnvMap map = build_mips(finest, MipFilter::box);
+    const TexelTopology topology = is_cube ? TexelTopology::cube(32) : TexelTopology::dual_paraboloid(32);
+    ASSERT_EQ(topology.texels(), map.values.size());
+    const auto read = [&](const TexelReads& texels) {
+      float sum = 0.0F;
+      for (const TexelWeight& t : texels) sum += t.weight * map.values[t.texel];
+      return sum;
+    };
+    for (std::uint32_t i = 0; i < 3000; ++i) {
+      const glm::vec3 d =
+          i % 4 == 0 ? glm::normalize(glm::vec3(1, 1, 1) + 0.05F * random_direction(i)) : random_direction(i);
+      const float size = std::pow(10.0F, 3.0F * unit_float(static_cast<std::uint32_t>(hash64(i))) - 3.0F);
+      if (!is_cube && (std::abs(d.z) < 0.3F || size > 0.1F)) continue;
+      const Footprint footprint{d, size * random_direction(i + 1), 0.3F * size * random_direction(i + 7)};
+      const auto value = [&](SampleFilter filter) {
+        return look_up(map, d, footprint.ddx, footprint.ddy, filter);
+      };
+      constexpr float kRounding = 1e-4F;
+      EXPECT_NEAR(value(SampleFilter::bilinear),
+                  read(reads(topology, footprint, {LookupFilter::bilinear, 1})), kRounding);
+      // The level in float and double: their logarithms differ by rounding, too.
+      EXPECT_NEAR(value(SampleFilter::trilinear),
+                  read(reads(topology, footprint, {LookupFilter::trilinear, 1})), 2.0F * kRounding)
+          << name << ' ' << i;
+      const MapPoint p = point_from_direction(map.layout.projection, glm::dvec3(d));
+      const auto from_side = [](double x) { return std::abs(16.0 * x - std::round(16.0 * x)); };
+      if (std::min(from_side(p.x), from_side(p.y)) < 1e-5) continue;  // rounding decides for a texel
+      EXPECT_EQ(value(SampleFilter::nearest), read(reads(topology, footprint, {LookupFilter::nearest, 1})));
+    }
+  }
+}
+
+TEST(Sampling, ALevelIsReadAsAskedFor) {
+  EnvMap map = make_map("cube", 32, 32, [](glm::dvec3) { return 0.0; });
+  for (int level = 0; level < map.layout.levels; ++level) {
+    for (std::size_t i = map.layout.level_offset(level); i < map.layout.level_offset(level + 1); ++i)
+      map.values[i] = static_cast<float>(level);
+  }
+  const std::vector<float> levels = {0.0F, 2.25F, 5.0F, 7.0F, -3.0F, 1e30F, -1e30F};
+  const std::vector<float> expected = {0.0F, 2.25F, 5.0F, 5.0F, 0.0F, 5.0F, 0.0F};
+  std::vector<glm::vec3> d;
+  for (std::uint32_t i = 0; i < levels.size(); ++i) d.push_back(random_direction(i));
+  std::vector<float> values(levels.size());
+  sample(map, d, {}, {}, {.filter = SampleFilter::trilinear, .level = levels}, values);
+  for (std::size_t i = 0; i < levels.size(); ++i) EXPECT_FLOAT_EQ(values[i], expected[i]);
+  // One level for all, moved by a bias.
+  const float one = 1.5F;
+  sample(map, d, {}, {}, {.filter = SampleFilter::trilinear, .bias = 0.25, .level = std::span(&one, 1)},
+         values);
+  for (const float value : values) EXPECT_FLOAT_EQ(value, 1.75F);
+}
+
+// A bias is a larger footprint; where that still lies within a texel, the finest level is read.
+TEST(Sampling, ABiasScalesTheFootprint) {
+  const EnvMap map = make_map("cube", 64, 64, [](glm::dvec3 d) { return d.x * d.y + std::sin(20.0 * d.z); });
+  for (const SampleFilter filter : {SampleFilter::trilinear, SampleFilter::ewa}) {
+    for (std::uint32_t i = 0; i < 200; ++i) {
+      const glm::vec3 d = random_direction(i);
+      const glm::vec3 a = 0.02F * random_direction(i + 1);
+      const glm::vec3 b = 0.01F * random_direction(i + 2);
+      float biased = 0.0F;
+      sample(map, std::span(&d, 1), std::span(&a, 1), std::span(&b, 1), {.filter = filter, .bias = 2.0},
+             std::span(&biased, 1));
+      EXPECT_FLOAT_EQ(biased, look_up(map, d, 4.0F * a, 4.0F * b, filter));
+    }
+  }
+}
+
+TEST(Sampling, OptionsThatContradictEachOtherAreErrors) {
+  const EnvMap map = make_map("cube", 4, 4, [](glm::dvec3) { return 1.0; });
+  const std::vector<glm::vec3> d(3, {0, 0, 1});
+  std::vector<float> values(3);
+  const std::vector<float> two(2, 0.0F);
+  const float level = 1.0F;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto refuses = [&](const SampleOptions& options) {
+    EXPECT_THROW(sample(map, d, d, d, options, values), InvalidArgument);
+  };
+  refuses({.filter = SampleFilter::ewa, .level = std::span(&level, 1)});
+  refuses({.filter = SampleFilter::bilinear, .level = std::span(&level, 1)});
+  refuses({.filter = SampleFilter::trilinear, .level = two});
+  refuses({.filter = SampleFilter::trilinear, .level = std::span(&nan, 1)});
+  refuses({.filter = SampleFilter::nearest, .bias = 1.0});
+  refuses({.filter = SampleFilter::trilinear, .bias = 65.0});
+  refuses({.filter = SampleFilter::trilinear, .bias = std::numeric_limits<double>::quiet_NaN()});
+  refuses({.filter = SampleFilter::ewa, .max_anisotropy = 0.5});
 }
 
 TEST(Footprint, CornersOfAPixelGiveItsMiddleAndSides) {

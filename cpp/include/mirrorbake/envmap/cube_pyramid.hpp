@@ -28,9 +28,8 @@ struct CubePyramidLayout {
   }
 };
 
-/// The whole pyramid (texels × channels) of a cube map (6 × size × size × channels): every level is the mean
-/// of the finer one's 2×2 texels weighted by their solid angles ([EMT] §2.4; spec E3 b), which keeps the mean
-/// radiance over the sphere. Throws InvalidArgument if `faces` has another size.
+/// The whole pyramid (texels × channels) of a cube map (6 × size × size × channels): the values that
+/// build_mips makes with MipFilter::solid_angle. Throws InvalidArgument if `faces` has another size.
 std::vector<float> build_cube_pyramid(std::span<const float> faces, const CubePyramidLayout& layout,
                                       int channels);
 

@@ -40,7 +40,7 @@ bool IrregularTexels::covered(const TexelCorner& corner) const {
   return point_from_direction(job_.projection(), corner.direction).covered;
 }
 
-TexelPlace IrregularTexels::texel(const TexelCorner& corner) const {
+FaceTexel IrregularTexels::texel(const TexelCorner& corner) const {
   return {corner.face, std::clamp(static_cast<int>(corner.position.y), 0, job_.height() - 1),
           std::clamp(static_cast<int>(corner.position.x), 0, job_.width() - 1)};
 }
@@ -134,7 +134,7 @@ void IrregularTexels::start(Content content) {
   total_ = 0.0;
 }
 
-void IrregularTexels::add(const TexelPlace& texel, double weight) {
+void IrregularTexels::add(const FaceTexel& texel, double weight) {
   if (too_many_ || !(weight > 0.0)) return;
   if (part_.size() == kMostTaps) {
     if (consume_ != nullptr) {
@@ -152,7 +152,7 @@ void IrregularTexels::add(const TexelPlace& texel, double weight) {
 
 void IrregularTexels::merge(std::vector<Tap>& taps) {
   // Down to the weight, so that the order of equal texels does not depend on the library.
-  const auto number = [](const TexelPlace& texel) {
+  const auto number = [](const FaceTexel& texel) {
     return (static_cast<std::uint64_t>(texel.face) << 34U) + (static_cast<std::uint64_t>(texel.row) << 17U) +
            static_cast<std::uint64_t>(texel.column);
   };
@@ -400,7 +400,7 @@ void IrregularTexels::gather_point(const TexelCorner& at, double weight) {
   ++polygons_;
   if (content_ == Content::constant_texels) return add(texel(at), weight);
   emit_bilinear(job_.source, at.face, at.position.x, at.position.y,
-                [&](const TexelPlace& place, double share) { add(place, weight * share); });
+                [&](const FaceTexel& place, double share) { add(place, weight * share); });
 }
 
 void IrregularTexels::gather_polygon(int face, std::span<const glm::dvec2> corners) {
@@ -420,7 +420,7 @@ void IrregularTexels::gather_polygon(int face, std::span<const glm::dvec2> corne
     }
     interpolated_.for_each_texel([&](int column, int row, double weight) {
       emit_texel(job_.source, face, row, column, density * weight,
-                 [&](const TexelPlace& place, double share) { add(place, share); });
+                 [&](const FaceTexel& place, double share) { add(place, share); });
     });
     return;
   }

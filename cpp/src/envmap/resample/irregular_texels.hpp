@@ -52,12 +52,12 @@ class IrregularTexels {
   TexelCorner corner(int face, double x, double y) const;
   Corners corners(int face, glm::dvec2 low, glm::dvec2 high) const;
   bool covered(const TexelCorner& corner) const;
-  TexelPlace texel(const TexelCorner& corner) const;
+  FaceTexel texel(const TexelCorner& corner) const;
   std::optional<Quad> quad_on_face(const Corners& corners) const;
   double texels_across(int face, glm::dvec2 low, glm::dvec2 high) const;
   void start(Content content);
   void take_part(double share);
-  void add(const TexelPlace& texel, double weight);
+  void add(const FaceTexel& texel, double weight);
   static void merge(std::vector<Tap>& taps);
   void gather(int face, glm::dvec2 low, glm::dvec2 high, const Corners& corners, int depth);
   void gather_point(const TexelCorner& at, double weight);

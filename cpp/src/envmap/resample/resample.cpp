@@ -108,7 +108,7 @@ class TapApplication {
       apply(chunk.blocks, symmetry.source, targets);
       apply(chunk.lists, symmetry.source, targets);
     }
-    for (const TexelPlace& giant : chunk.giants) apply_giant(giant);
+    for (const FaceTexel& giant : chunk.giants) apply_giant(giant);
   }
 
  private:
@@ -235,11 +235,11 @@ class TapApplication {
     kernels_.number_texels(numbering, rows.data(), columns.data(), rows.size(), numbers.data());
   }
 
-  static std::uint32_t number(const EnvMapLayout& layout, const TexelPlace& texel) {
+  static std::uint32_t number(const EnvMapLayout& layout, const FaceTexel& texel) {
     return static_cast<std::uint32_t>(layout.index(0, texel.face, texel.row, texel.column));
   }
 
-  void apply_giant(const TexelPlace& target) {
+  void apply_giant(const FaceTexel& target) {
     // A symmetry may take the texel to itself.
     std::vector<TexelMap> maps;
     std::vector<std::uint32_t> targets;

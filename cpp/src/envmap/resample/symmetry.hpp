@@ -7,17 +7,10 @@
 #include <glm/mat3x3.hpp>
 
 #include "mirrorbake/envmap/envmap.hpp"
+#include "mirrorbake/envmap/texel_lookup.hpp"
 
 /// Turns and mirrors of the axes that take the texels of a map to texels of it.
 namespace mirrorbake {
-
-struct TexelPlace {
-  int face = 0;
-  int row = 0;
-  int column = 0;
-
-  bool operator==(const TexelPlace&) const = default;
-};
 
 /// Where a symmetry takes the texels of one face: rows and columns of `face` are sums of whole multiples (0,
 /// 1 or −1) of the row and the column before, and of an offset. Columns of a panorama count on across its
@@ -37,7 +30,7 @@ struct TexelMap {
   std::array<FaceMap, 6> faces;
   int width = 1;  ///< columns are taken modulo this
 
-  TexelPlace operator()(const TexelPlace& texel) const {
+  FaceTexel operator()(const FaceTexel& texel) const {
     const FaceMap& map = faces[static_cast<std::size_t>(texel.face)];
     int column = map.column_per_row * texel.row + map.column_per_column * texel.column + map.column_offset;
     column += column < 0 ? width : 0;

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <array>
-#include <cmath>
-#include <cstddef>
 #include <vector>
 
+#include "mirrorbake/core/bilinear.hpp"
 #include "mirrorbake/envmap/texel_lookup.hpp"
 #include "symmetry.hpp"
 
@@ -12,12 +11,12 @@ namespace mirrorbake {
 
 /// A texel of the source and its part in one of the target.
 struct Tap {
-  TexelPlace texel;
+  FaceTexel texel;
   double weight = 0.0;
 };
 
-/// texel_at() for a map of one level and one channel, as a place.
-inline TexelPlace place_at(const EnvMapLayout& layout, int face, int row, int column) {
+/// continued() on the finest level, without its trigonometry where that is known.
+inline FaceTexel place_at(const EnvMapLayout& layout, int face, int row, int column) {
   if (layout.projection.kind == ProjectionKind::latlong) {
     // Beyond a pole lies what is half a turn away.
     const bool beyond = row < 0 || row >= layout.height;
@@ -26,26 +25,22 @@ inline TexelPlace place_at(const EnvMapLayout& layout, int face, int row, int co
     column = (column + (beyond ? layout.width / 2 : 0)) % layout.width;
     return {face, row, column < 0 ? column + layout.width : column};
   }
-  const std::size_t index = texel_at(layout, 0, face, row, column);
-  const std::size_t line = index / static_cast<std::size_t>(layout.width);
-  const std::size_t height = static_cast<std::size_t>(layout.height);
-  return {static_cast<int>(line / height), static_cast<int>(line % height),
-          static_cast<int>(index % static_cast<std::size_t>(layout.width))};
+  return continued(layout.projection, layout.width, layout.height, {face, row, column});
 }
 
 /// Calls emit(place, weight) for a texel that may lie one beyond the face. Beyond a corner of a cube there is
-/// none: its neighbours around the corner get a third each, as in interpolate().
+/// none: its neighbours around the corner get a third each, as in add_face_bilinear().
 template <typename Emit>
 void emit_texel(const EnvMapLayout& layout, int face, int row, int column, double weight, Emit&& emit) {
   const bool outside_row = row < 0 || row >= layout.height;
   const bool outside_column = column < 0 || column >= layout.width;
   if (!outside_row && !outside_column) {
-    emit(TexelPlace{face, row, column}, weight);
+    emit(FaceTexel{face, row, column}, weight);
   } else if (outside_row && outside_column && layout.projection.kind == ProjectionKind::cube) {
     const int last = layout.height - 1;
     const int inner_row = row < 0 ? 0 : last;
     const int inner_column = column < 0 ? 0 : last;
-    emit(TexelPlace{face, inner_row, inner_column}, weight / 3.0);
+    emit(FaceTexel{face, inner_row, inner_column}, weight / 3.0);
     emit(place_at(layout, face, inner_row, column), weight / 3.0);
     emit(place_at(layout, face, row, inner_column), weight / 3.0);
   } else {
@@ -56,14 +51,12 @@ void emit_texel(const EnvMapLayout& layout, int face, int row, int column, doubl
 /// The taps of bilinear interpolation at (x, y), in texels from the top left corner of a face.
 template <typename Emit>
 void emit_bilinear(const EnvMapLayout& layout, int face, double x, double y, Emit&& emit) {
-  const int left = static_cast<int>(std::floor(x - 0.5));
-  const int top = static_cast<int>(std::floor(y - 0.5));
-  const double fx = x - 0.5 - left;
-  const double fy = y - 0.5 - top;
-  emit_texel(layout, face, top, left, (1.0 - fx) * (1.0 - fy), emit);
-  emit_texel(layout, face, top, left + 1, fx * (1.0 - fy), emit);
-  emit_texel(layout, face, top + 1, left, (1.0 - fx) * fy, emit);
-  emit_texel(layout, face, top + 1, left + 1, fx * fy, emit);
+  const BilinearCell<double> cell = bilinear_cell(x, y);
+  const std::array<double, 4> weights = cell.weights();
+  for (int i = 0; i < 4; ++i) {
+    emit_texel(layout, face, cell.row + i / 2, cell.column + i % 2, weights[static_cast<std::size_t>(i)],
+               emit);
+  }
 }
 
 }  // namespace mirrorbake

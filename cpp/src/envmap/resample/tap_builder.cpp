@@ -389,7 +389,7 @@ void TapBuilder::add_list(int row, int column, TapChunk& chunk) {
   const std::size_t i = corner(row, column);
   TapChunk::Lists& lists = chunk.lists;
   const std::size_t before = lists.weights.size();
-  const auto add = [&](const TexelPlace& texel, double weight) {
+  const auto add = [&](const FaceTexel& texel, double weight) {
     lists.faces.push_back(static_cast<std::uint8_t>(texel.face));
     lists.rows.push_back(narrow(texel.row));
     lists.columns.push_back(narrow(texel.column));

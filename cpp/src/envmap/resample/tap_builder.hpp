@@ -48,7 +48,7 @@ struct TapChunk {
   int face = 0;  ///< of the target
   Blocks blocks;
   Lists lists;
-  std::vector<TexelPlace> giants;  ///< targets of more taps than are worth keeping: IrregularTexels::stream()
+  std::vector<FaceTexel> giants;  ///< targets of more taps than are worth keeping: IrregularTexels::stream()
 
   std::size_t bytes() const;
   void clear();

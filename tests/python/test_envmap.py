@@ -129,9 +129,9 @@ def test_levels_broadcast_to_the_directions_and_a_bias_adds_to_them() -> None:
     rows = mips.sample(directions, filter="trilinear", level=[[0.5], [1.5]])[..., 0]
     np.testing.assert_allclose(rows, [[0.5] * 3, [1.5] * 3])
     assert mips.sample([0, 0, 1], filter="trilinear", level=0.5, bias=0.75)[0] == 1.25
-    with pytest.raises(_core.InvalidArgument, match=r"level has the shape \(5,\), expected a number, or \(2, 3\)"):
+    with pytest.raises(_core.InvalidArgument, match=r"level has the shape \(5,\), expected .* \(2, 3\)"):
         mips.sample(directions, filter="trilinear", level=np.zeros(5))
-    with pytest.raises(_core.InvalidArgument, match="level is given, expected none, or the filter trilinear"):
+    with pytest.raises(_core.InvalidArgument, match="level is given"):
         mips.sample(directions, level=0.0)
     with pytest.raises(_core.InvalidArgument, match="bias is nan"):
         mips.sample(directions, filter="trilinear", level=0.0, bias=float("nan"))

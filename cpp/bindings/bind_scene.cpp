@@ -258,6 +258,31 @@ void bind_scene(nb::module_& m) {
           "Add a texture whose texels are read from an image file when they are needed, and kept in a cache\n"
           "of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].")
       .def(
+          "texture_pixels",
+          [](const Scene& scene, int texture) {
+            const Texture& chosen = element(scene.textures, "texture", texture);
+            Image image;
+            {
+              nb::gil_scoped_release released;
+              image = texture_image(chosen);
+            }
+            const std::size_t channels = image.channels.size();
+            const auto height = static_cast<std::size_t>(image.height);
+            const auto width = static_cast<std::size_t>(image.width);
+            return to_numpy(std::move(image.pixels), {height, width, channels});
+          },
+          nb::arg("texture"),
+          "Copy of a texture's texels, (height, width, 3), or (height, width, 1) for one channel that "
+          "stands\n"
+          "for all three; scene-linear, row 0 at the top. Raises FileError if its file has changed.")
+      .def(
+          "texture_wrap",
+          [](const Scene& scene, int texture) {
+            const Texture& chosen = element(scene.textures, "texture", texture);
+            return std::pair(chosen.wrap_u, chosen.wrap_v);
+          },
+          nb::arg("texture"), "How coordinates outside [0,1] find texels, along u and v.")
+      .def(
           "add_material",
           [](Scene& scene, const Material& material) { return append(scene.materials, material); },
           nb::arg("material"), "Add a copy of a material.")

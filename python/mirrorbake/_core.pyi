@@ -706,6 +706,15 @@ class Scene:
         of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].
         """
 
+    def texture_pixels(self, texture: int) -> NDArray[numpy.float32]:
+        """
+        Copy of a texture's texels, (height, width, 3), or (height, width, 1) for one channel that stands
+        for all three; scene-linear, row 0 at the top. Raises FileError if its file has changed.
+        """
+
+    def texture_wrap(self, texture: int) -> tuple[TextureWrap, TextureWrap]:
+        """How coordinates outside [0,1] find texels, along u and v."""
+
     def add_material(self, material: Material) -> int:
         """Add a copy of a material."""
 

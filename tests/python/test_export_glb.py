@@ -18,10 +18,12 @@ from mirrorbake import _core
 from mirrorbake.bake.bake import bake
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.pem.export.glb import export_glb
-from mirrorbake.pem.export.gltf_material import gltf_material
+from mirrorbake.pem.export.glb_file import GlbFile
+from mirrorbake.pem.export.gltf_material import add_textures, gltf_material
 from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.build import BuiltScene, build_scene
 from mirrorbake.scene.load import parse_config
+from viewer_cases import case_scene, cases
 from web_tools import node_folder
 
 ROOT = Path(__file__).parents[2]
@@ -239,3 +241,36 @@ def test_what_cannot_be_written_is_refused(baked: tuple[PemStore, BuiltScene], t
     with pytest.raises(InputError, match="cannot write"):
         export_glb(*baked, tmp_path / "missing" / "a.glb")
     assert not list(tmp_path.iterdir())
+
+
+def test_textures_of_the_material_go_with_it() -> None:
+    case = next(case for case in cases() if case.textured)
+    materials = case_scene(case).materials
+    first = materials.materials[0]
+    for fresnel, base in ((first.fresnel, "reflectance"), (_core.Fresnel(r0=(0.04,) * 3), "albedo")):
+        core = _core.Material(name="shiny", specular=True, albedo=(0.4, 0.4, 0.4), fresnel=fresnel)
+        described, _ = gltf_material(core)
+        described.setdefault("extensions", {})
+        file = GlbFile()
+        add_textures(described, first, materials.textures, file, 32)
+        file.document["materials"] = [described]
+        glb = Glb(file.to_bytes())
+        material = glb.json["materials"][0]
+        used = material["pbrMetallicRoughness"]["baseColorTexture"]
+        texture = glb.json["textures"][used["index"]]
+        number = first.reflectance_texture if base == "reflectance" else first.albedo_texture
+        assert number is not None
+        pixels = glb.image(texture["source"]) / 255.0
+        linear = np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
+        assert np.abs(linear - materials.textures[number.texture].pixels(32)).max() < 2.3 * 0.51 / 255.0
+        wraps = [10497, 10497] if base == "albedo" else [33648, 33648]
+        assert list(glb.json["samplers"][texture["sampler"]].values()) == wraps
+        assert used["extensions"]["KHR_texture_transform"] == {
+            "offset": list(number.offset),
+            "scale": list(number.scale),
+            "rotation": number.rotation,
+        }
+        assert material["normalTexture"]["scale"] == 1.0
+        assert ("specularColorTexture" in material["extensions"].get("KHR_materials_specular", {})) == (
+            base == "albedo"
+        )

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from mirrorbake.pem.export.images import ImageFormat, probe_image
 from mirrorbake.pem.export.mesh_file import ReflectorMesh, octahedral, write_mesh
 from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_atlas, level_place, to_atlas
 from mirrorbake.pem.export.web import WebOptions, WebPem
-from viewer_cases import CasePem, Scene, case_scene, case_source, cases
+from viewer_cases import Case, CasePem, Scene, case_scene, case_source, cases, irradiance
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +119,7 @@ def read_array(payload: bytes, array: dict[str, int | str]) -> NDArray[np.float6
 
 def test_a_mesh_comes_back_sorted_by_part_and_shells(scene: Scene) -> None:
     mesh = scene.mesh
-    data, layout = write_mesh(mesh, 2)
+    data, layout = write_mesh(mesh)
     payload = gzip.decompress(data)
     assert len(payload) == layout["bytes"]
     arrays = layout["arrays"]
@@ -126,9 +127,11 @@ def test_a_mesh_comes_back_sorted_by_part_and_shells(scene: Scene) -> None:
     low, high = np.array(layout["bounds"]["low"]), np.array(layout["bounds"]["high"])
     positions = low + read_array(payload, arrays["positions"]) / 65535.0 * (high - low)
     start = 0
-    for part, described in enumerate(layout["parts"]):
+    for part, described in enumerate(layout["ranges"]):
         mine = mesh.parts == part
         assert described == {
+            "part": part,
+            "material": 0,
             "start": start,
             "stacked": np.count_nonzero(mine & mesh.whole_stack),
             "count": np.count_nonzero(mine),
@@ -143,6 +146,70 @@ def test_a_mesh_comes_back_sorted_by_part_and_shells(scene: Scene) -> None:
         assert (np.abs(error) <= 0.51 / 65535.0 * (high - low)).all()
 
 
+def test_triangles_are_sorted_by_material_within_a_part(scene: Scene) -> None:
+    materials = (np.arange(len(scene.mesh.triangles)) % 3).astype(np.uint16)
+    mesh = replace(scene.mesh, materials=materials)
+    _, layout = write_mesh(mesh)
+    assert [(r["part"], r["material"]) for r in layout["ranges"]] == [
+        (part, material) for part in range(2) for material in range(3)
+    ]
+    counts = [
+        np.count_nonzero((mesh.parts == r["part"]) & (materials == r["material"])) for r in layout["ranges"]
+    ]
+    assert [r["count"] for r in layout["ranges"]] == counts
+
+
+def test_texture_coordinates_come_back_with_v_downwards() -> None:
+    mesh = case_scene(textured()).mesh
+    data, layout = write_mesh(mesh)
+    payload, arrays = gzip.decompress(data), layout["arrays"]
+    order = np.cumsum(read_array(payload, arrays["indices"])[:, 0].astype(np.int64))
+    low, high = np.array(layout["uvBounds"]["low"]), np.array(layout["uvBounds"]["high"])
+    uvs = (low + read_array(payload, arrays["uvs"]) / 65535.0 * (high - low))[order]
+    colors = (read_array(payload, arrays["colors"]) / 65535.0)[order]
+    ranked = np.lexsort((~mesh.whole_stack, mesh.materials, mesh.parts))
+    expected = mesh.uvs[mesh.triangles[ranked].ravel()] * [1.0, -1.0] + [0.0, 1.0]
+    assert (np.abs(uvs - expected) <= 0.51 / 65535.0 * (high - low)).all()
+    assert np.abs(colors - mesh.colors[mesh.triangles[ranked].ravel()]).max() <= 0.51 / 65535.0
+
+
+def textured() -> Case:
+    return next(case for case in cases() if case.textured)
+
+
+def test_textures_are_written_as_they_were_or_smaller() -> None:
+    case = textured()
+    source = case_source(case, case_scene(case), CasePem())
+    texels = source.materials.textures[0].pixels(64)
+    exact = ImageFormat(exact=True)
+    web = WebPem(source, WebOptions(exact))
+    described = json.loads(web.read("manifest.json"))
+    assert [t["linear"] for t in described["textures"]] == [False, False, True]
+    assert described["textures"][1]["wrap"] == ["mirror", "mirror"]
+    seen = exact.decode(web.read(described["textures"][0]["image"] + ".webp")) / 255.0
+    linear = np.where(seen <= 0.04045, seen / 12.92, ((seen + 0.055) / 1.055) ** 2.4)
+    # Half a step of 8 bits, at sRGB's steepest 2.3 wide.
+    assert np.abs(linear - texels).max() < 2.3 * 0.51 / 255.0
+    small = WebPem(source, WebOptions(exact, texture_size=16))
+    assert exact.decode(small.read("textures/0.webp")).shape == (16, 16, 3)
+    means = texels.reshape(16, 4, 16, 4, 3).mean(axis=(1, 3))
+    assert np.abs(source.materials.textures[0].pixels(16) - means).max() < 1e-6
+
+
+def test_irradiance_that_changes_is_written_for_every_sample() -> None:
+    case = next(case for case in cases() if case.moves)
+    scene = case_scene(case)
+    web = WebPem(case_source(case, scene, CasePem()), WebOptions())
+    names = [sample["irradiance"] for sample in json.loads(web.read("manifest.json"))["samples"]]
+    count = json.loads(web.read("manifest.json"))["mesh"]["arrays"]["positions"]["count"]
+    array = {"type": "float16", "components": 3, "count": count, "offset": 0}
+    read = [read_array(gzip.decompress(web.read(name)), array) for name in names]
+    for k, values in enumerate(read):
+        expected = irradiance(case, scene.mesh.normals, k)
+        assert np.allclose(np.sort(values, axis=0)[[0, -1]], np.sort(expected, axis=0)[[0, -1]], rtol=1e-3)
+    assert np.abs(read[0] - read[2]).max() > 0.1
+
+
 def test_vertices_that_no_triangle_uses_are_left_out() -> None:
     mesh = ReflectorMesh(
         positions=np.array([[9, 9, 9], [0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32),
@@ -150,9 +217,12 @@ def test_vertices_that_no_triangle_uses_are_left_out() -> None:
         triangles=np.array([[1, 2, 3]], np.uint32),
         parts=np.zeros(1, np.uint16),
         whole_stack=np.ones(1, np.bool_),
-        diffuse=None,
+        uvs=np.zeros((0, 2), np.float32),
+        colors=np.zeros((0, 3), np.float32),
+        materials=np.zeros(1, np.uint16),
+        irradiance=None,
     )
-    _, layout = write_mesh(mesh, 1)
+    _, layout = write_mesh(mesh)
     assert layout["arrays"]["positions"]["count"] == 3
     assert layout["bounds"]["high"] == [1.0, 1.0, 1.0]
     assert "normals" not in layout["arrays"]
@@ -165,6 +235,7 @@ def test_the_manifest_names_every_file_and_no_other(scene: Scene) -> None:
     images = [manifest["static"]["image"]]
     for sample in manifest["samples"]:
         images.append(sample["still"])
+        assert sample["irradiance"] is None
         for part in sample["maps"]:
             for files in part:
                 images += [name for name in files.values() if name is not None]

@@ -20,12 +20,15 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.pem.export.images import ImageFormat
+from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
 from mirrorbake.pem.export.radiance_code import RadianceCode
 from mirrorbake.pem.export.source import ExportSource, Part, Shell, run_time_attributes
 from mirrorbake.pem.export.web import WebOptions, WebPem
-from mirrorbake.proxy import proxy_to_attributes
+from mirrorbake.pem.shells import moved_proxy
+from mirrorbake.proxy import proxy_from_attributes, proxy_to_attributes
 from mirrorbake.scene.parameters import Axis, ParameterSpace
+from mirrorbake.scene.pose import Pose
 from mirrorbake.viewer.export import write_folder
 
 if TYPE_CHECKING:
@@ -48,6 +51,10 @@ class Case:
     local: _core.Proxy
     fresnel: _core.Fresnel
     coated: bool = False
+    textured: bool = False
+    """Textures of albedo, reflectance and normals, and coloured vertices."""
+    moves: bool = False
+    """The object moves and turns, with its local shell; the diffuse layer changes on the way."""
     run_time: _core.RunTimeModel = field(default_factory=lambda: _core.run_time_model("Web"))
 
 
@@ -97,7 +104,40 @@ def cases() -> list[Case]:
             local,
             _core.Fresnel(model=model.constant, r0=(0.8, 0.8, 0.8)),
         ),
+        Case("textured", _core.Proxy.infinite(origin), local, schlick, textured=True),
+        Case(
+            "moving",
+            _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, straight),
+            turned_local,
+            schlick,
+            moves=True,
+        ),
     ]
+
+
+PIVOT = (0.0, 0.1, 0.0)
+MOTION = {"to": [0.06, 0.01, -0.05], "turn": 50.0, "pivot": list(PIVOT)}
+
+
+def _pose(case: Case, t: float) -> Pose:
+    if not case.moves:
+        return Pose(np.zeros(3), 0.0, np.array(PIVOT))
+    return Pose(t * np.array(MOTION["to"]), t * 50.0, np.array(PIVOT))
+
+
+def _waves(shift: float) -> FloatArray:
+    """A smooth picture of 64² pixels whose channels differ, in [0, 1]."""
+    y, x = np.mgrid[0:64, 0:64] * (2.0 * math.pi / 64.0)
+    channels = [0.5 + 0.3 * np.sin(x + shift + c) * np.cos(y - c) + 0.1 * np.sin(2 * y + c) for c in range(3)]
+    return np.stack(channels, axis=-1).astype(np.float32)
+
+
+def _bumps() -> FloatArray:
+    """Tangent-space normals that lean by 15° at most."""
+    y, x = np.mgrid[0:64, 0:64] * (2.0 * math.pi / 64.0)
+    lean = np.stack([0.2 * np.sin(x) * np.cos(y), 0.2 * np.sin(2 * y), np.ones_like(x)], axis=-1)
+    lean /= np.linalg.norm(lean, axis=-1, keepdims=True)
+    return (0.5 + 0.5 * lean).astype(np.float32)
 
 
 def _maps(seed: int, channels: int) -> FloatArray:
@@ -134,11 +174,10 @@ class Scene:
 
     tracer: _core.Tracer
     mesh: ReflectorMesh
-    irradiance: FloatArray
-    albedo: float
+    materials: Materials
 
 
-def case_scene(case: Case) -> Scene:
+def case_scene(case: Case, t: float = 0.0) -> Scene:
     torus, ball = (
         _core.make_torus((0.0, 0.1, 0.0), 0.12, 0.04, 40),
         _core.make_sphere((0.0, 0.13, 0.0), 0.06, 32),
@@ -160,16 +199,50 @@ def case_scene(case: Case) -> Scene:
         albedo=(0.4, 0.4, 0.4),
         layers=_core.LayerModel.coated if case.coated else _core.LayerModel.additive,
     )
-    mesh = _core.TriangleMesh(positions, triangles, normals, None, parts)
-    scene.add_object("object", mesh, scene.add_material(material), ["ring", "ball"])
+    uvs = colors = None
+    if case.textured:
+        uvs = (6.0 * positions[:, [0, 2]]).astype(np.float32)
+        colors = (0.75 + 0.25 * normals).astype(np.float32)
+        use = _core.TextureReference
+        material.albedo_texture = use(scene.add_texture(_waves(0.3)), rotation=0.4, scale=(1.5, 0.7))
+        mirrored = _core.TextureWrap.mirror
+        material.specular_texture = use(scene.add_texture(_waves(1.7), mirrored, mirrored), offset=(0.3, 0.1))
+        material.normal_texture = use(scene.add_texture(_bumps()))
+        material.colors_tint_reflectance = True
+    pose = _pose(case, t)
+    mesh = _core.TriangleMesh(
+        pose.moved(positions.astype(np.float64)).astype(np.float32),
+        triangles,
+        (normals @ pose.rotation.T).astype(np.float32),
+        uvs,
+        parts,
+        colors,
+    )
+    number = scene.add_material(material)
+    scene.add_object("object", mesh, number, ["ring", "ball"])
     scene.set_environment(np.ones((2, 4, 3), np.float32), 1.0, 0.0)
-    irradiance = (0.5 + 0.5 * normals[:, 1:2] * np.array([1.0, 0.8, 0.6])).astype(np.float32)
     whole = np.ones(len(triangles), np.bool_)
     whole[: len(triangles) // 5] = False
     exported = ReflectorMesh(
-        positions, normals, triangles, parts, whole, (irradiance * (0.4 / math.pi)).astype(np.float32)
+        positions,
+        normals,
+        triangles,
+        parts,
+        whole,
+        np.zeros((0, 2), np.float32) if uvs is None else uvs,
+        np.zeros((0, 3), np.float32) if colors is None else colors,
+        np.zeros(len(triangles), np.uint16),
+        irradiance(case, normals, 0),
     )
-    return Scene(_core.Tracer(scene, _core.TracerOptions()), exported, irradiance, 0.4)
+    return Scene(_core.Tracer(scene, _core.TracerOptions()), exported, export_materials(scene, [number]))
+
+
+def irradiance(case: Case, normals: FloatArray, sample: int) -> FloatArray:
+    """Of the vertices in a sample: light from above, which turns blue on the way."""
+    share = sample / (len(PARAMETERS) - 1) if case.moves else 0.0
+    colour = np.array([1.0, 0.8, 0.6]) * (1.0 - share) + np.array([0.3, 0.5, 1.0]) * share
+    values: FloatArray = ((0.5 + 0.5 * normals[:, 1:2]) * colour).astype(np.float32)
+    return values
 
 
 def _eye(t: float) -> tuple[float, float, float]:
@@ -205,34 +278,32 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
     parts = (
         Part(
             "ring",
-            (Shell("local", local, MAP_SIZE, opaque=False), Shell("distant", distant, MAP_SIZE, opaque=True)),
+            (
+                Shell("local", local, MAP_SIZE, opaque=False, moves=case.moves),
+                Shell("distant", distant, MAP_SIZE, opaque=True),
+            ),
         ),
         Part("ball", (Shell("distant", distant, MAP_SIZE, opaque=True),)),
     )
     return ExportSource(
         parts=parts,
-        space=ParameterSpace((Axis("arc", PARAMETERS, 0.0, 1.0),)),
-        motion=None,
+        space=ParameterSpace((Axis("motion" if case.moves else "arc", PARAMETERS, 0.0, 1.0),)),
+        motion=MOTION if case.moves else None,
         pyramid=pem.pyramid,
         still=lambda sample: np.full((HEIGHT, WIDTH, 3), 0.2 + 0.2 * sample, np.float32),
         mesh=scene.mesh,
-        material={
-            "fresnel": case.fresnel.model.name,
-            "r0": list(case.fresnel.r0),
-            "eta": list(case.fresnel.eta),
-            "k": list(case.fresnel.k),
-            "coated": case.coated,
-        },
+        materials=scene.materials,
+        irradiance=(lambda sample: irradiance(case, scene.mesh.normals, sample)) if case.moves else None,
         static=_maps(1234, 3),
         static_proxy=distant,
         static_size=MAP_SIZE,
         camera={
-            "kind": "arc",
+            "kind": "fixed" if case.moves else "arc",
             "target": [0.0, 0.1, 0.0],
             "radius": DISTANCE * math.cos(math.radians(ELEVATION)),
             "height": DISTANCE * math.sin(math.radians(ELEVATION)),
             "startDegrees": 0.0,
-            "degrees": ARC_DEGREES,
+            "degrees": 0.0 if case.moves else ARC_DEGREES,
             "verticalFovDegrees": FOV,
             "aspect": WIDTH / HEIGHT,
             "pixels": HEIGHT,
@@ -243,9 +314,11 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
     )
 
 
-def reference(case: Case, scene: Scene, pem: CasePem, code: RadianceCode, t: float) -> FloatArray:
+def reference(case: Case, pem: CasePem, code: RadianceCode, t: float) -> FloatArray:
     """The C++ renderer's picture at a parameter, (H, W, 4)."""
-    camera = _core.Camera(_eye(t), (0.0, 0.1, 0.0), vertical_fov_degrees=FOV, width=WIDTH, height=HEIGHT)
+    scene, pose = case_scene(case, t), _pose(case, t)
+    eye = _eye(0.0 if case.moves else t)
+    camera = _core.Camera(eye, (0.0, 0.1, 0.0), vertical_fov_degrees=FOV, width=WIDTH, height=HEIGHT)
     samples = scene.tracer.trace_visibility(camera, 0, places=case.run_time.places)
     place = t * (len(PARAMETERS) - 1)
     first = min(int(place), len(PARAMETERS) - 2)
@@ -256,16 +329,19 @@ def reference(case: Case, scene: Scene, pem: CasePem, code: RadianceCode, t: flo
         b = pem.rounded(code, first + 1, part, shell)
         return (1 - weight) * a + weight * b
 
+    local = proxy_from_attributes(moved_proxy(proxy_to_attributes(case.local), pose))
     layout = _core.CubePyramidLayout(MAP_SIZE)
     stacked = scene.mesh.whole_stack.astype(np.uint8)
     parts = [
         [
-            _core.ShellMap(case.local, layout, blended(0, 0), stacked),
+            _core.ShellMap(local, layout, blended(0, 0), stacked),
             _core.ShellMap(case.distant, layout, blended(0, 1)),
         ],
         [_core.ShellMap(case.distant, layout, blended(1, 0))],
     ]
-    diffuse = _core.diffuse_from_irradiance(samples, scene.mesh.triangles, scene.irradiance)
+    normals = scene.mesh.normals
+    here = irradiance(case, normals, first) * (1 - weight) + irradiance(case, normals, first + 1) * weight
+    diffuse = _core.diffuse_from_irradiance(samples, scene.mesh.triangles, here)
     return _core.render_reflector(samples, parts, diffuse, case.run_time)
 
 
@@ -279,7 +355,7 @@ def write_case(case: Case, folder: Path, image_format: ImageFormat) -> None:
     code = RadianceCode(**manifest["radiance"])
     pictures: list[dict[str, Any]] = []
     for k, t in enumerate((0.0, 0.3)):
-        reference(case, scene, pem, code, t).astype("<f4").tofile(folder / f"reference-{k}.f32")
+        reference(case, pem, code, t).astype("<f4").tofile(folder / f"reference-{k}.f32")
         pictures.append({"file": f"reference-{k}.f32", "parameter": t, "elevation": ELEVATION})
     (folder / "reference.json").write_text(
         json.dumps({"width": WIDTH, "height": HEIGHT, "distance": DISTANCE, "pictures": pictures})

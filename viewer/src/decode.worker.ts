@@ -35,6 +35,7 @@ async function decode(request: DecodeRequest): Promise<Decoded> {
     }
     return { width, height, packed };
   }
+  if (request.kind === "texture") return { width, height, pixels: new Uint8Array(data.buffer) };
   const { size } = request;
   const rows = size > 1 ? 3 * size : 2;
   if (width !== 3 * size || height !== rows) {
@@ -48,7 +49,9 @@ self.onmessage = async (event: MessageEvent<DecodeRequest & { id: number }>) => 
   const { id } = event.data;
   try {
     const result = await decode(event.data);
-    const owned = [result.packed?.buffer, result.alpha?.buffer].filter((b) => b !== undefined);
+    const owned = [result.packed?.buffer, result.alpha?.buffer, result.pixels?.buffer].filter(
+      (b) => b !== undefined,
+    );
     self.postMessage({ id, result }, { transfer: owned as Transferable[] });
   } catch (failure) {
     self.postMessage({ id, failure: failure instanceof Error ? failure.message : String(failure) });

@@ -9,6 +9,7 @@ export type DecodeRequest = { bytes: ArrayBuffer; type: string } & (
   | { kind: "still"; code: RadianceCode }
   | { kind: "radiance"; size: number; code: RadianceCode }
   | { kind: "alpha"; size: number }
+  | { kind: "texture" }
 );
 
 export interface Decoded {
@@ -16,6 +17,8 @@ export interface Decoded {
   height: number;
   packed?: Uint32Array;
   alpha?: Uint8Array;
+  /// RGBA of a texture.
+  pixels?: Uint8Array;
   colours?: number[][];
 }
 

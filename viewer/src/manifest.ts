@@ -20,6 +20,46 @@ export interface Shell {
   size: number;
   opaque: boolean;
   proxy: ProxyShape;
+  /// Whether the proxy moves with the object.
+  moves: boolean;
+}
+
+export interface TextureUse {
+  texture: number;
+  /// Rows of the 2×3 matrix from the mesh's coordinates to the image's.
+  matrix: number[];
+}
+
+export interface Material {
+  name: string;
+  specular: boolean;
+  fresnel: "constant" | "schlick" | "dielectric" | "conductor";
+  r0: Vec3;
+  eta: Vec3;
+  k: Vec3;
+  coated: boolean;
+  albedo: Vec3;
+  albedoTexture: TextureUse | null;
+  reflectanceTexture: TextureUse | null;
+  normalTexture: TextureUse | null;
+  normalScale: number;
+  colorsTintReflectance: boolean;
+}
+
+export interface TextureImage {
+  image: string;
+  wrap: ["repeat" | "clamp" | "mirror", "repeat" | "clamp" | "mirror"];
+  /// Whether it holds numbers, not colours.
+  linear: boolean;
+}
+
+/// Triangles of one part and one material, those first that carry all shells.
+export interface Range {
+  part: number;
+  material: number;
+  start: number;
+  stacked: number;
+  count: number;
 }
 
 export interface MapFiles {
@@ -31,6 +71,8 @@ export interface Sample {
   parameter: number[];
   maps: MapFiles[][];
   still: string | null;
+  /// File of the vertices' irradiance, if it changes from sample to sample.
+  irradiance: string | null;
 }
 
 /// One dimension of the parameter space; samples are at the grid of all axes' values, the last axis running fastest.
@@ -73,7 +115,8 @@ export interface Manifest {
     aspect: number;
     pixels: number;
   };
-  material: { fresnel: string; r0: Vec3; eta: Vec3; k: Vec3; coated: boolean };
+  materials: Material[];
+  textures: TextureImage[];
   radiance: RadianceCode;
   images: { suffix: string; type: string; exact: boolean; fallback: boolean };
   probe: { file: string; colours: number[][] };
@@ -81,8 +124,9 @@ export interface Manifest {
   mesh: {
     file: string;
     bounds: { low: Vec3; high: Vec3 };
+    uvBounds?: { low: [number, number]; high: [number, number] };
     arrays: { [name: string]: MeshArray };
-    parts: { start: number; stacked: number; count: number }[];
+    ranges: Range[];
     bytes: number;
   };
   parts: { name: string; shells: Shell[] }[];
@@ -90,6 +134,8 @@ export interface Manifest {
   samples: Sample[];
   first: number;
 }
+
+const VERSION = 2;
 
 const LARGEST_MESH = 1 << 30;
 
@@ -152,6 +198,55 @@ function checkAxes(data: Manifest): void {
   }
 }
 
+function checkMaterials(data: Manifest): void {
+  const { materials, textures } = data;
+  const fits = (use: TextureUse | null) =>
+    use === null ||
+    (isIndex(use?.texture, textures.length) &&
+      Array.isArray(use.matrix) &&
+      use.matrix.length === 6 &&
+      use.matrix.every(Number.isFinite));
+  const valid =
+    Array.isArray(textures) &&
+    textures.every((t) => isName(t.image) && Array.isArray(t.wrap) && t.wrap.length === 2) &&
+    Array.isArray(materials) &&
+    materials.length >= 1 &&
+    materials.every(
+      (m) =>
+        [m.r0, m.eta, m.k, m.albedo].every(isVector) &&
+        fits(m.albedoTexture) &&
+        fits(m.reflectanceTexture) &&
+        fits(m.normalTexture),
+    );
+  if (!valid) damaged("its materials are not described");
+}
+
+function isIndex(i: unknown, count: number): i is number {
+  return Number.isInteger(i) && (i as number) >= 0 && (i as number) < count;
+}
+
+function checkMesh(data: Manifest): void {
+  const { mesh, parts, materials } = data;
+  if (!isName(mesh?.file) || !(mesh.bytes >= 0 && mesh.bytes <= LARGEST_MESH))
+    damaged("the mesh is not described");
+  for (const name of ["positions", "indices"]) {
+    if (!mesh.arrays?.[name]) damaged(`the mesh has no ${name}`);
+  }
+  if (!isVector(mesh.bounds?.low) || !isVector(mesh.bounds?.high)) damaged("the mesh has no bounds");
+  const triangles = Math.floor(mesh.arrays.indices.count / 3) + 1;
+  const valid =
+    Array.isArray(mesh.ranges) &&
+    mesh.ranges.every(
+      (range) =>
+        isIndex(range.part, parts.length) &&
+        isIndex(range.material, materials.length) &&
+        isIndex(range.start, triangles) &&
+        isIndex(range.start + range.count, triangles) &&
+        isIndex(range.stacked, range.count + 1),
+    );
+  if (!valid) damaged("the mesh has other parts");
+}
+
 /// Parses and checks a manifest; throws UserError.
 export function parseManifest(text: string): Manifest {
   let data: Manifest & { format?: string; version?: number };
@@ -161,10 +256,10 @@ export function parseManifest(text: string): Manifest {
     return damaged("it is not JSON");
   }
   if (data?.format !== "mirrorbake-web") damaged("it is not that of a PEM");
-  if (data.version !== 1) {
+  if (data.version !== VERSION) {
     throw new UserError(
       "version",
-      `These files are of version ${data.version} of the format; this page shows version 1. Export them again.`,
+      `These files are of version ${data.version} of the format; this page shows version ${VERSION}. Export them again.`,
     );
   }
   if (!Array.isArray(data.parts) || data.parts.length < 1) damaged("it has no parts");
@@ -190,20 +285,14 @@ export function parseManifest(text: string): Manifest {
           maps.length === data.parts[p].shells.length &&
           maps.every((m) => isName(m.radiance) && (m.alpha === null || isName(m.alpha))),
       ) &&
-      (sample.still === null || isName(sample.still));
+      (sample.still === null || isName(sample.still)) &&
+      (sample.irradiance === null || isName(sample.irradiance));
     if (!fits) damaged("a sample does not have the maps of all parts and shells");
   }
   if (!isSize(data.static?.size) || !isName(data.static.image)) damaged("the static map is not described");
   checkProxy(data.static.proxy, "the static map");
-  const mesh = data.mesh;
-  if (!isName(mesh?.file) || !(mesh.bytes >= 0 && mesh.bytes <= LARGEST_MESH))
-    damaged("the mesh is not described");
-  for (const name of ["positions", "indices"]) {
-    if (!mesh.arrays?.[name]) damaged(`the mesh has no ${name}`);
-  }
-  if (!isVector(mesh.bounds?.low) || !isVector(mesh.bounds?.high)) damaged("the mesh has no bounds");
-  if (!Array.isArray(mesh.parts) || mesh.parts.length !== data.parts.length)
-    damaged("the mesh has other parts");
+  checkMaterials(data);
+  checkMesh(data);
   if (!isName(data.probe?.file) || !isName(data.poster?.file)) damaged("the poster is not described");
   if (!Array.isArray(data.runTime?.places) || data.runTime.places.length < 1)
     damaged("it has no run-time model");

@@ -6,7 +6,10 @@ import type { Manifest, MeshArray } from "./manifest";
 export interface Mesh {
   positions: Uint16Array;
   normals: Int16Array | null;
-  diffuse: Uint16Array | null;
+  uvs: Uint16Array | null;
+  colors: Uint16Array | null;
+  /// Half floats.
+  irradiance: Uint16Array | null;
   indices: Uint32Array;
 }
 
@@ -44,7 +47,7 @@ export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Pro
   if (payload.length !== mesh.bytes) {
     throw new UserError("damaged", "The mesh's file is damaged: it has another length than it should.");
   }
-  const { positions, indices, normals, diffuse } = mesh.arrays;
+  const { positions, indices, normals, uvs, colors, irradiance } = mesh.arrays;
   const differences = new Int32Array(gather(payload, indices));
   const result = new Uint32Array(differences.length);
   let index = 0;
@@ -61,7 +64,32 @@ export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Pro
   return {
     positions: new Uint16Array(gather(payload, positions)),
     normals: normals ? new Int16Array(gather(payload, normals)) : null,
-    diffuse: diffuse ? new Uint16Array(gather(payload, diffuse)) : null,
+    uvs: uvs ? new Uint16Array(gather(payload, uvs)) : null,
+    colors: colors ? new Uint16Array(gather(payload, colors)) : null,
+    irradiance: irradiance ? new Uint16Array(gather(payload, irradiance)) : null,
     indices: result,
   };
+}
+
+/// The irradiance of a sample's vertices, three half floats for each of `count`, filled up to `padded` vertices.
+export async function decodeIrradiance(
+  name: string,
+  file: ArrayBuffer,
+  count: number,
+  padded: number,
+): Promise<Uint16Array> {
+  const damaged = new UserError(
+    "damaged",
+    `The file ${name} is damaged: it has another length than it should.`,
+  );
+  let payload: Uint8Array;
+  try {
+    payload = await inflate(file);
+  } catch {
+    throw damaged;
+  }
+  if (payload.length !== 6 * count) throw damaged;
+  const values = new Uint16Array(3 * padded);
+  values.set(new Uint16Array(gather(payload, { type: "float16", components: 3, count, offset: 0 })));
+  return values;
 }

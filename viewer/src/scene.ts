@@ -4,6 +4,7 @@ import { SampleCache } from "./cache";
 import { Decoder, sameColours } from "./decoder";
 import { UserError } from "./errors";
 import { type Files, textOf } from "./files";
+import { irradianceTexels } from "./gl/map_pool";
 import { type FrameState, Renderer } from "./gl/renderer";
 import { type Axis, type Manifest, parseManifest, type Vec3 } from "./manifest";
 import {
@@ -17,7 +18,7 @@ import {
   type View,
   windowOf,
 } from "./math";
-import { decodeMesh, type Mesh } from "./mesh";
+import { decodeIrradiance, decodeMesh, type Mesh } from "./mesh";
 import { type Blend, neighbours, nodeCount } from "./space";
 import type { Settings } from "./state";
 
@@ -292,8 +293,27 @@ export class Scene {
     const code = this.manifest.radiance;
     const { packed } = await this.decoder.decode(file, { kind: "radiance", bytes, type, size, code });
     if (packed && renderer === this.renderer) renderer.uploadStatic(packed);
+    await Promise.all(
+      this.manifest.textures.map((texture, number) => this.loadTexture(texture.image, number)),
+    );
     this.hasStatic = true;
     this.events.changed();
+  }
+
+  private async loadTexture(name: string, number: number): Promise<void> {
+    const { file, type } = this.image(name);
+    const { renderer } = this;
+    const bytes = await this.files.read(file);
+    const { width, height, pixels } = await this.decoder.decode(file, { kind: "texture", bytes, type });
+    if (pixels && renderer === this.renderer) renderer.uploadTexture(number, width, height, pixels);
+  }
+
+  private async loadIrradiance(file: string, slot: number): Promise<void> {
+    const { renderer, manifest } = this;
+    const bytes = await this.files.read(file);
+    const { count } = manifest.mesh.arrays.positions;
+    const values = await decodeIrradiance(file, bytes, count, irradianceTexels(manifest));
+    if (renderer === this.renderer) renderer.pool.uploadIrradiance(slot, values);
   }
 
   private async loadSample(sample: number, slot: number): Promise<void> {
@@ -325,6 +345,8 @@ export class Scene {
         renderer.uploadMap(slot, part, shell, light.packed, cover?.alpha);
       }),
     );
+    const { irradiance } = this.manifest.samples[sample];
+    if (irradiance !== null) jobs.push(this.loadIrradiance(irradiance, slot));
     await Promise.all(jobs);
   }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "mirrorbake/core/bilinear.hpp"
+#include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/scene/scene.hpp"
 
 namespace mirrorbake {
@@ -62,6 +63,24 @@ glm::vec3 texture_mean(const Texture& texture) {
   }
   const std::size_t texels = image.pixels.size() / channels;
   return glm::vec3(sum / static_cast<double>(texels));
+}
+
+Image texture_image(const Texture& texture) {
+  if (!texture.file) return texture.image;
+  const TextureFile& file = *texture.file;
+  Image image(file.width(), file.height(), {"R", "G", "B"});
+  parallel_for(static_cast<std::size_t>(image.height), 16, [&](std::size_t first, std::size_t last) {
+    for (int y = static_cast<int>(first); y < static_cast<int>(last); ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        const glm::vec2 centre{(static_cast<float>(x) + 0.5F) / static_cast<float>(image.width),
+                               1.0F - (static_cast<float>(y) + 0.5F) / static_cast<float>(image.height)};
+        const glm::vec3 value = file.lookup(centre, 0.0F, TextureWrap::clamp, TextureWrap::clamp);
+        float* pixel = image.at(x, y);
+        for (int c = 0; c < 3; ++c) pixel[c] = value[c];
+      }
+    }
+  });
+  return image;
 }
 
 bool has_gaps(const Material& material) {

@@ -111,6 +111,11 @@ TEST_F(TextureFiles, FindTheSameTexelsAsTexturesInMemory) {
         EXPECT_LT(glm::distance(texture_lookup(in_file, uv), expected), tolerance + 3e-4) << name << " " << i;
       }
       EXPECT_LT(glm::distance(texture_mean(in_file), texture_mean(in_memory)), 1e-5F);
+      const Image copy = texture_image(in_file);
+      ASSERT_EQ(copy.pixels.size(), in_memory.image.pixels.size());
+      for (std::size_t i = 0; i < copy.pixels.size(); ++i) {
+        ASSERT_NEAR(copy.pixels[i], in_memory.image.pixels[i], tolerance + 3e-4) << name << " " << i;
+      }
     }
   }
 }

@@ -2,12 +2,21 @@ import { layerSize } from "../atlas";
 import { UserError } from "../errors";
 import type { Manifest } from "../manifest";
 import type { Counters } from "./program";
+import { IRRADIANCE_ROW } from "./shaders";
+
+export const IRRADIANCE_UNIT = 2;
 
 /// Bytes of the maps of one sample on the GPU.
 export function sampleBytes(manifest: Manifest): number {
   const { width, height } = layerSize(largestSize(manifest));
   const { maps, alphas } = mapCounts(manifest);
-  return 6 * width * height * (4 * maps + alphas);
+  return 6 * width * height * (4 * maps + alphas) + 6 * irradianceTexels(manifest);
+}
+
+/// Texels of a sample's irradiance: one for each vertex, whole rows of them; 0 where it does not change.
+export function irradianceTexels(manifest: Manifest): number {
+  if (manifest.samples[0].irradiance === null) return 0;
+  return IRRADIANCE_ROW * Math.ceil(manifest.mesh.arrays.positions.count / IRRADIANCE_ROW);
 }
 
 export function largestSize(manifest: Manifest): number {
@@ -20,7 +29,7 @@ export function mapCounts(manifest: Manifest): { maps: number; alphas: number } 
   return { maps: shells.length, alphas: shells.filter((s) => !s.opaque).length };
 }
 
-/// The maps on the GPU: two array textures of one size for the life of the page, in which samples take turns.
+/// The maps on the GPU: array textures of one size for the life of the page, in which samples take turns.
 export class MapPool {
   /// How many samples there is room for.
   readonly capacity: number;
@@ -29,6 +38,8 @@ export class MapPool {
   readonly height: number;
   private readonly radiance: WebGLTexture | null;
   private readonly alpha: WebGLTexture | null;
+  private readonly irradiance: WebGLTexture | null = null;
+  private readonly irradianceRows: number;
   private readonly maps: number;
   private readonly alphas: number;
 
@@ -60,9 +71,21 @@ export class MapPool {
     this.capacity = Math.min(Math.max(affordable, least), room, manifest.samples.length);
     const radianceLayers = 6 * (this.capacity * maps + 1);
     const alphaLayers = Math.max(6 * this.capacity * alphas, 1);
-    this.bytes = width * height * (4 * radianceLayers + alphaLayers);
-    this.radiance = this.texture(gl.RGB9_E5, radianceLayers);
-    this.alpha = this.texture(gl.R8, alphaLayers);
+    this.irradianceRows = irradianceTexels(manifest) / IRRADIANCE_ROW;
+    this.bytes =
+      width * height * (4 * radianceLayers + alphaLayers) +
+      6 * IRRADIANCE_ROW * this.irradianceRows * this.capacity;
+    this.radiance = this.texture(gl.RGB9_E5, width, height, radianceLayers, gl.LINEAR);
+    this.alpha = this.texture(gl.R8, width, height, alphaLayers, gl.LINEAR);
+    if (this.irradianceRows > 0) {
+      this.irradiance = this.texture(
+        gl.RGB16F,
+        IRRADIANCE_ROW,
+        this.irradianceRows,
+        this.capacity,
+        gl.NEAREST,
+      );
+    }
   }
 
   /// First layer of a map of the sample in a slot; `map` counts through parts and shells.
@@ -107,22 +130,54 @@ export class MapPool {
     ++this.counters.uploaded;
   }
 
-  /// Binds radiance to unit 0 and α to unit 1.
+  get hasIrradiance(): boolean {
+    return this.irradiance !== null;
+  }
+
+  /// Half floats, three for every texel (irradianceTexels).
+  uploadIrradiance(slot: number, values: Uint16Array): void {
+    const { gl, irradianceRows } = this;
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.irradiance);
+    gl.texSubImage3D(
+      gl.TEXTURE_2D_ARRAY,
+      0,
+      0,
+      0,
+      slot,
+      IRRADIANCE_ROW,
+      irradianceRows,
+      1,
+      gl.RGB,
+      gl.HALF_FLOAT,
+      values,
+    );
+    ++this.counters.uploaded;
+  }
+
+  /// Binds radiance to unit 0, α to unit 1 and irradiance to IRRADIANCE_UNIT.
   bind(): void {
     const { gl } = this;
+    gl.activeTexture(gl.TEXTURE0 + IRRADIANCE_UNIT);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.irradiance);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.alpha);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.radiance);
   }
 
-  private texture(format: number, layers: number): WebGLTexture | null {
+  private texture(
+    format: number,
+    width: number,
+    height: number,
+    layers: number,
+    filter: number,
+  ): WebGLTexture | null {
     const { gl } = this;
     const handle = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D_ARRAY, handle);
-    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, format, this.width, this.height, layers);
-    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
-    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, format, width, height, layers);
+    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, filter);
+    gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, filter);
     gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
     gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
     ++this.counters.allocated;

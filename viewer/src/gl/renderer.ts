@@ -2,13 +2,15 @@
 
 import { layerSize } from "../atlas";
 import { UserError } from "../errors";
-import type { Manifest, ProxyShape } from "../manifest";
+import type { Manifest, Range } from "../manifest";
 import type { View } from "../math";
 import type { Mesh } from "../mesh";
 import { nodeCount } from "../space";
-import { MapPool } from "./map_pool";
+import { IRRADIANCE_UNIT, MapPool } from "./map_pool";
 import { type Counters, Program } from "./program";
+import { type Motion, Proxies } from "./proxies";
 import * as shaders from "./shaders";
+import { Surfaces } from "./surfaces";
 import { Targets } from "./targets";
 
 export type Content = "pem" | "static" | "still";
@@ -43,17 +45,11 @@ export interface FrameState {
   stillScale: [number, number];
 }
 
-const FRESNEL: { [name: string]: number } = { constant: 0, schlick: 1, dielectric: 2, conductor: 3 };
-const SHAPES: { [name: string]: number } = { infinite: 0, box: 1, ellipsoid: 2, hemisphere: 3 };
-
-const ORIGIN = [0, 0, 0];
+const ORIGIN: [number, number, number] = [0, 0, 0];
 
 interface PartUniforms {
-  shape: Int32Array;
-  centre: Float32Array;
-  proxyFromWorld: Float32Array;
-  halfExtent: Float32Array;
-  origin: Float32Array;
+  /// Of the shells, front to back, and last of the static map.
+  proxies: Proxies;
   size: Float32Array;
   shellOn: Float32Array;
   radianceLayer: Float32Array;
@@ -75,9 +71,12 @@ export class Renderer {
   private readonly vertices: WebGLVertexArrayObject | null;
   private readonly empty: WebGLVertexArrayObject | null;
   private readonly parts: PartUniforms[];
-  private readonly staticUniforms: PartUniforms;
+  private readonly staticProxy: Proxies;
+  private readonly surfaces: Surfaces;
+  private readonly motion: Motion;
   private readonly nodes: number;
   private readonly weights: Float32Array;
+  private readonly slots: Float32Array;
   private readonly flat: boolean;
   private stillTexture: WebGLTexture | null = null;
 
@@ -95,6 +94,8 @@ export class Renderer {
     }
     this.nodes = nodeCount(manifest.axes);
     this.weights = new Float32Array(this.nodes);
+    this.slots = new Float32Array(this.nodes);
+    this.motion = { cosine: 1, sine: 0, pivot: manifest.motion?.pivot ?? ORIGIN, offset: ORIGIN };
     this.pool = new MapPool(gl, manifest, budget, this.nodes, this.counters);
     this.targets = new Targets(gl, this.counters);
     for (const part of manifest.parts) this.meshProgram(part.shells.length);
@@ -105,20 +106,25 @@ export class Renderer {
     this.empty = gl.createVertexArray();
     this.vertices = this.uploadMesh(mesh);
     this.flat = mesh.normals === null;
-    this.staticUniforms = partUniforms([], manifest.static.proxy, [manifest.static.size], 0, 0, 1);
+    this.surfaces = new Surfaces(gl, manifest, this.counters);
+    this.staticProxy = new Proxies([manifest.static.proxy], [false]);
     let firstMap = 0;
     let firstAlpha = 0;
-    this.parts = manifest.parts.map((part) => {
-      const uniforms = partUniforms(
-        part.shells.map((s) => s.proxy),
-        manifest.static.proxy,
-        [...part.shells.map((s) => s.size), manifest.static.size],
+    this.parts = manifest.parts.map(({ shells }) => {
+      const uniforms: PartUniforms = {
+        proxies: new Proxies(
+          [...shells.map((s) => s.proxy), manifest.static.proxy],
+          [...shells.map((s) => s.moves), false],
+        ),
+        size: Float32Array.from([...shells.map((s) => s.size), manifest.static.size]),
+        shellOn: new Float32Array(shells.length).fill(1),
+        radianceLayer: new Float32Array(shells.length * this.nodes),
+        alphaLayer: new Float32Array(shells.length * this.nodes),
         firstMap,
         firstAlpha,
-        this.nodes,
-      );
-      firstMap += part.shells.length;
-      firstAlpha += part.shells.filter((s) => !s.opaque).length;
+      };
+      firstMap += shells.length;
+      firstAlpha += shells.filter((s) => !s.opaque).length;
       return uniforms;
     });
   }
@@ -128,7 +134,7 @@ export class Renderer {
     if (!program) {
       program = new Program(
         this.gl,
-        shaders.MESH_VERTEX,
+        shaders.meshVertex(this.nodes),
         shaders.meshFragment(shells, this.nodes),
         this.counters,
       );
@@ -156,7 +162,10 @@ export class Renderer {
     };
     attribute(0, mesh.positions as BufferSource, 3, gl.UNSIGNED_SHORT, true);
     if (mesh.normals) attribute(1, mesh.normals as BufferSource, 2, gl.SHORT, true);
-    if (mesh.diffuse) attribute(2, mesh.diffuse as BufferSource, 3, gl.HALF_FLOAT, false);
+    if (mesh.irradiance) attribute(2, mesh.irradiance as BufferSource, 3, gl.HALF_FLOAT, false);
+    if (mesh.uvs) attribute(3, mesh.uvs as BufferSource, 2, gl.UNSIGNED_SHORT, true);
+    if (mesh.colors) attribute(4, mesh.colors as BufferSource, 3, gl.UNSIGNED_SHORT, true);
+    else gl.vertexAttrib3f(4, 1, 1, 1);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices as BufferSource, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
@@ -184,6 +193,11 @@ export class Renderer {
       const before = shells.slice(0, shell).filter((s) => !s.opaque).length;
       this.pool.uploadAlpha(this.pool.alphaLayer(slot, uniforms.firstAlpha + before), width, height, alpha);
     }
+  }
+
+  /// Pixels RGBA of a texture of the materials.
+  uploadTexture(number: number, width: number, height: number, pixels: Uint8Array): void {
+    this.surfaces.upload(number, width, height, pixels);
   }
 
   uploadStill(width: number, height: number, texels: Uint32Array): void {
@@ -299,7 +313,8 @@ export class Renderer {
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LESS);
     gl.bindVertexArray(this.vertices);
-    for (let p = 0; p < this.parts.length; ++p) this.drawPart(frame, content, place, p);
+    this.move(frame);
+    for (const range of this.manifest.mesh.ranges) this.drawRange(frame, content, place, range);
   }
 
   private drawBackground(frame: FrameState, place: [number, number]): void {
@@ -317,24 +332,26 @@ export class Renderer {
     gl.uniform2f(background.at("uPlace"), place[0], place[1]);
     gl.uniform1f(background.at("uSize"), this.manifest.static.size);
     gl.uniform1f(background.at("uStaticLayer"), pool.staticLayer());
-    const proxy = this.staticUniforms;
     gl.uniform3fv(background.at("uEye"), view.eye);
-    gl.uniform1i(background.at("uShape"), proxy.shape[0]);
-    gl.uniform3fv(background.at("uCentre"), proxy.centre);
-    gl.uniformMatrix3fv(background.at("uProxyFromWorld"), false, proxy.proxyFromWorld);
-    gl.uniform3fv(background.at("uHalfExtent"), proxy.halfExtent);
-    gl.uniform3fv(background.at("uOrigin"), proxy.origin);
+    this.staticProxy.set(gl, background);
     const [r, g, b] = frame.plain;
     gl.uniform4f(background.at("uPlain"), r, g, b, frame.background === "plain" ? 1 : 0);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  private drawPart(frame: FrameState, content: Content, place: [number, number], p: number): void {
+  private move(frame: FrameState): void {
+    if (!this.manifest.motion) return;
+    this.motion.cosine = Math.cos(frame.turn);
+    this.motion.sine = Math.sin(frame.turn);
+    this.motion.offset = frame.offset;
+    for (const part of this.parts) part.proxies.move(this.motion);
+  }
+
+  private drawRange(frame: FrameState, content: Content, place: [number, number], range: Range): void {
     const { gl, manifest, pool } = this;
     const { view } = frame;
-    const part = this.parts[p];
-    const shells = manifest.parts[p].shells;
-    const range = manifest.mesh.parts[p];
+    const part = this.parts[range.part];
+    const { shells } = manifest.parts[range.part];
     if (range.count === 0) return;
     const program = this.meshProgram(shells.length);
     program.use();
@@ -351,8 +368,13 @@ export class Renderer {
     const { low, high } = manifest.mesh.bounds;
     gl.uniform3fv(program.at("uLow"), low);
     gl.uniform3f(program.at("uExtent"), high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    const uv = manifest.mesh.uvBounds;
+    if (uv) {
+      gl.uniform2fv(program.at("uUvLow"), uv.low);
+      gl.uniform2f(program.at("uUvExtent"), uv.high[0] - uv.low[0], uv.high[1] - uv.low[1]);
+    }
     gl.uniform2f(program.at("uTurn"), Math.cos(frame.turn), Math.sin(frame.turn));
-    gl.uniform3fv(program.at("uPivot"), manifest.motion?.pivot ?? ORIGIN);
+    gl.uniform3fv(program.at("uPivot"), this.motion.pivot);
     gl.uniform3fv(program.at("uOffset"), frame.offset);
     gl.uniform3fv(program.at("uEye"), view.eye);
     gl.uniform3fv(program.at("uForward"), view.forward);
@@ -360,11 +382,7 @@ export class Renderer {
     gl.uniform3fv(program.at("uDown"), view.down);
     gl.uniform1f(program.at("uFootprint"), frame.footprint);
     gl.uniform1i(program.at("uFlat"), this.flat ? 1 : 0);
-    gl.uniform1iv(program.at("uShape"), part.shape);
-    gl.uniform3fv(program.at("uCentre"), part.centre);
-    gl.uniformMatrix3fv(program.at("uProxyFromWorld"), false, part.proxyFromWorld);
-    gl.uniform3fv(program.at("uHalfExtent"), part.halfExtent);
-    gl.uniform3fv(program.at("uOrigin"), part.origin);
+    part.proxies.set(gl, program);
     gl.uniform1fv(program.at("uSize"), part.size);
     let alpha = 0;
     for (let s = 0; s < shells.length; ++s) {
@@ -378,20 +396,20 @@ export class Renderer {
       }
       if (!shells[s].opaque) ++alpha;
     }
-    for (let n = 0; n < this.nodes; ++n) this.weights[n] = frame.weights[n];
+    for (let n = 0; n < this.nodes; ++n) {
+      this.weights[n] = frame.weights[n];
+      this.slots[n] = frame.slots[n];
+    }
     gl.uniform1fv(program.at("uShellOn"), part.shellOn);
     gl.uniform1fv(program.at("uRadianceLayer"), part.radianceLayer);
     gl.uniform1fv(program.at("uAlphaLayer"), part.alphaLayer);
     gl.uniform1fv(program.at("uWeight"), this.weights);
     gl.uniform1f(program.at("uStaticLayer"), pool.staticLayer());
     gl.uniform1f(program.at("uPem"), content === "pem" ? frame.pem : 0);
-    const { material } = manifest;
-    gl.uniform1i(program.at("uFresnel"), frame.fresnelOn ? (FRESNEL[material.fresnel] ?? 0) : 4);
-    gl.uniform3fv(program.at("uR0"), material.r0);
-    gl.uniform3fv(program.at("uEta"), material.eta);
-    gl.uniform3fv(program.at("uK"), material.k);
-    gl.uniform1i(program.at("uCoated"), material.coated ? 1 : 0);
-    gl.uniform1f(program.at("uDiffuseOn"), frame.diffuseOn ? 1 : 0);
+    gl.uniform1i(program.at("uIrradiance"), IRRADIANCE_UNIT);
+    gl.uniform1i(program.at("uIrradianceChanges"), pool.hasIrradiance && frame.pem > 0 ? 1 : 0);
+    gl.uniform1fv(program.at("uSlot"), this.slots);
+    this.surfaces.set(program, range.material, frame.fresnelOn, frame.diffuseOn);
     // Triangles that carry all shells, then those on the hull.
     const stacked = program.at("uStacked");
     gl.uniform1i(stacked, 1);
@@ -408,46 +426,4 @@ export class Renderer {
       );
     }
   }
-}
-
-function partUniforms(
-  proxies: ProxyShape[],
-  staticProxy: ProxyShape,
-  sizes: number[],
-  firstMap: number,
-  firstAlpha: number,
-  nodes: number,
-): PartUniforms {
-  const all = [...proxies, staticProxy];
-  const uniforms: PartUniforms = {
-    shape: new Int32Array(all.length),
-    centre: new Float32Array(3 * all.length),
-    proxyFromWorld: new Float32Array(9 * all.length),
-    halfExtent: new Float32Array(3 * all.length).fill(1),
-    origin: new Float32Array(3 * all.length),
-    size: Float32Array.from(sizes),
-    shellOn: new Float32Array(proxies.length).fill(1),
-    radianceLayer: new Float32Array(proxies.length * nodes),
-    alphaLayer: new Float32Array(proxies.length * nodes),
-    firstMap,
-    firstAlpha,
-  };
-  all.forEach((proxy, i) => {
-    uniforms.shape[i] = SHAPES[proxy.shape];
-    uniforms.origin.set(proxy.origin, 3 * i);
-    uniforms.centre.set(proxy.centre ?? [0, 0, 0], 3 * i);
-    uniforms.halfExtent.set(proxy.half_extent ?? [1, 1, 1], 3 * i);
-    const radii = proxy.radii ?? (proxy.radius ? [proxy.radius, proxy.radius, proxy.radius] : [1, 1, 1]);
-    const axes = proxy.axes ?? [
-      [1, 0, 0],
-      [0, 1, 0],
-      [0, 0, 1],
-    ];
-    for (let row = 0; row < 3; ++row) {
-      for (let column = 0; column < 3; ++column) {
-        uniforms.proxyFromWorld[9 * i + 3 * column + row] = axes[row][column] / radii[row];
-      }
-    }
-  });
-  return uniforms;
 }

@@ -8,20 +8,35 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 `;
 
-export const MESH_VERTEX = `${HEADER}
+/// Vertices of a row of the texture that holds irradiance.
+export const IRRADIANCE_ROW = 1024;
+
+export function meshVertex(nodes: number): string {
+  return `${HEADER}
+#define NODES ${nodes}
 layout(location = 0) in vec3 aPosition;
 layout(location = 1) in vec2 aNormal;
-layout(location = 2) in vec3 aDiffuse;
+layout(location = 2) in vec3 aIrradiance;
+layout(location = 3) in vec2 aUv;
+layout(location = 4) in vec3 aColor;
 uniform mat4 uClipFromWorld;
 uniform vec2 uShift;  // of the image, in clip space
 uniform vec3 uLow;
 uniform vec3 uExtent;
+uniform vec2 uUvLow;
+uniform vec2 uUvExtent;
 uniform vec2 uTurn;  // cosine and sine of the object's turn about the vertical through uPivot
 uniform vec3 uPivot;
 uniform vec3 uOffset;
+uniform bool uIrradianceChanges;
+uniform sampler2DArray uIrradiance;
+uniform float uSlot[NODES];
+uniform float uWeight[NODES];
 out vec3 vPosition;
 out vec3 vNormal;
-out vec3 vDiffuse;
+out vec3 vIrradiance;
+out vec2 vUv;
+out vec3 vColor;
 
 vec3 fromOctahedron(vec2 e) {
   vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
@@ -36,11 +51,21 @@ vec3 turned(vec3 v) {
 void main() {
   vPosition = turned(uLow + aPosition * uExtent - uPivot) + uPivot + uOffset;
   vNormal = turned(fromOctahedron(aNormal));
-  vDiffuse = aDiffuse;
+  vUv = uUvLow + aUv * uUvExtent;
+  vColor = aColor;
+  vIrradiance = aIrradiance;
+  if (uIrradianceChanges) {
+    ivec2 texel = ivec2(gl_VertexID % ${IRRADIANCE_ROW}, gl_VertexID / ${IRRADIANCE_ROW});
+    vIrradiance = vec3(0.0);
+    for (int i = 0; i < NODES; ++i) {
+      vIrradiance += uWeight[i] * texelFetch(uIrradiance, ivec3(texel, int(uSlot[i])), 0).rgb;
+    }
+  }
   gl_Position = uClipFromWorld * vec4(vPosition, 1.0);
   gl_Position.xy += uShift * gl_Position.w;
 }
 `;
+}
 
 /// Reads of a map: needs the samplers uRadiance and uAlpha, and uLayer: 1 / size of a layer in texels.
 const READS = `
@@ -188,7 +213,9 @@ export function meshFragment(shells: number, nodes: number): string {
 #define NODES ${nodes}
 in vec3 vPosition;
 in vec3 vNormal;
-in vec3 vDiffuse;
+in vec3 vIrradiance;
+in vec2 vUv;
+in vec3 vColor;
 out vec4 oColour;
 ${READS}
 uniform vec3 uEye;
@@ -213,12 +240,22 @@ uniform float uStaticLayer;
 uniform float uPem;  // share of the PEM in the mixture with the static map
 uniform bool uStacked;  // false: the last shell alone
 
-uniform int uFresnel;  // 0: constant, 1: Schlick, 2: dielectric, 3: conductor, 4: none
+uniform int uFresnel;  // 0: constant, 1: Schlick, 2: dielectric, 3: conductor, 4: none, 5: no mirror
 uniform vec3 uR0;
 uniform vec3 uEta;
 uniform vec3 uK;
 uniform bool uCoated;
 uniform float uDiffuseOn;
+uniform vec3 uAlbedo;
+uniform float uNormalScale;
+uniform bool uColorsTint;
+uniform bvec3 uTextured;  // albedo, reflectance, normal
+uniform sampler2D uAlbedoTexture;
+uniform sampler2D uReflectanceTexture;
+uniform sampler2D uNormalTexture;
+uniform mat3x2 uAlbedoFromUv;
+uniform mat3x2 uReflectanceFromUv;
+uniform mat3x2 uNormalFromUv;
 
 ${EXITS}
 vec3 lookupDirection(int shell, vec3 p, vec3 d) {
@@ -227,14 +264,15 @@ vec3 lookupDirection(int shell, vec3 p, vec3 d) {
   );
 }
 
-vec3 fresnel(float cosine) {
+vec3 fresnel(float cosine, vec3 r0) {
   float c = clamp(cosine, 0.0, 1.0);
-  if (uFresnel == 0) return uR0;
+  if (uFresnel == 0) return r0;
   if (uFresnel == 4) return vec3(1.0);
+  if (uFresnel == 5) return vec3(0.0);
   float q = (1.0 - c) * (1.0 + c);
   if (uFresnel == 1) {
     float m = 1.0 - c;
-    return min(uR0 + (1.0 - uR0) * (m * m * m * m * m), 1.0);
+    return min(r0 + (1.0 - r0) * (m * m * m * m * m), 1.0);
   }
   if (uFresnel == 2) {
     vec3 g2 = (uEta - 1.0) * (uEta + 1.0) + c * c;
@@ -267,6 +305,24 @@ vec3 bend(vec3 view, vec3 n, vec3 g) {
   vec3 middle = view + normalize(r + (lowest - height) * g);
   float size = length(middle);
   return size > 0.0 ? middle / size : g;
+}
+
+// Tracer's mapped_normal (glTF 2.0 §3.9.3): v of the coordinates counts downwards, that of the texels upwards. \`front\` is the
+// geometric normal of the triangle's front.
+vec3 mapped(vec3 n, vec3 front, vec3 px, vec3 py, vec2 ux, vec2 uy) {
+  float determinant = ux.x * uy.y - uy.x * ux.y;
+  if (determinant == 0.0) return n;
+  float turn = sign(determinant);
+  vec3 along = turn * (px * uy.y - py * ux.y);
+  vec3 t = along - dot(along, n) * n;
+  float size = length(t);
+  if (!(size > 0.0)) return n;
+  t /= size;
+  vec3 b = cross(n, t);
+  if (dot(b, turn * (px * uy.x - py * ux.x)) < 0.0) b = -b;
+  vec3 texel = 2.0 * texture(uNormalTexture, uNormalFromUv * vec3(vUv, 1.0)).rgb - 1.0;
+  vec3 bent = uNormalScale * (texel.x * t + texel.y * b) + texel.z * n;
+  return length(bent) > 1e-6 && dot(bent, front) > 0.0 ? normalize(bent) : n;
 }
 
 vec3 reflectedChange(vec3 change, vec3 d, vec3 n, vec3 dNormal) {
@@ -320,6 +376,7 @@ void main() {
   float normalLength = max(length(vNormal), 1e-6);
   vec3 n = side * vNormal / normalLength;
   if (uFlat || dot(n, g) <= 0.0) n = g;
+  if (uTextured.z) n = side * mapped(side * n, side * g, px, py, dFdx(vUv), dFdy(vUv));
   n = bend(view, n, g);
   vec3 d = -view;
   vec3 r = normalize(2.0 * dot(n, view) * n - view);
@@ -361,8 +418,12 @@ void main() {
     vec3 captured = readShell(SHELLS, vPosition, r, pd[0], rd[0], pd[1], rd[1]).rgb;
     light = mix(captured, light, uPem);
   }
-  vec3 f = fresnel(dot(n, view));
-  vec3 body = uDiffuseOn * vDiffuse * (uCoated ? 1.0 - f : vec3(1.0));
+  vec3 r0 = uR0 * (uColorsTint ? vColor : vec3(1.0));
+  if (uTextured.y) r0 *= texture(uReflectanceTexture, uReflectanceFromUv * vec3(vUv, 1.0)).rgb;
+  vec3 f = fresnel(dot(n, view), r0);
+  vec3 albedo = uAlbedo * vColor;
+  if (uTextured.x) albedo *= texture(uAlbedoTexture, uAlbedoFromUv * vec3(vUv, 1.0)).rgb;
+  vec3 body = uDiffuseOn * albedo * (vIrradiance * 0.3183098861837907) * (uCoated ? 1.0 - f : vec3(1.0));
   oColour = vec4(min(light * f + body, 65000.0), 1.0);
 }
 `;

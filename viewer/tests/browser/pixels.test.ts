@@ -93,6 +93,19 @@ describe("the page's pixels against the C++ renderer", () => {
     });
   }
 
+  // The page filters textures by levels, the tracer reads the finest one; textures have 8 bits on the way.
+  test("are the same with textures, bent normals and coloured vertices", async () => {
+    const figures = await compare("textured");
+    console.log("textured", figures.map((f) => f.toFixed(1)).join(" "), "dB");
+    for (const figure of figures) expect(figure).toBeGreaterThan(40);
+  });
+
+  test("are the same where the object, its shell and its diffuse light move", async () => {
+    const figures = await compare("moving");
+    console.log("moving", figures.map((f) => f.toFixed(1)).join(" "), "dB");
+    for (const figure of figures) expect(figure).toBeGreaterThan(LEAST_DB);
+  });
+
   test("lose what AVIF loses and no more", async () => {
     const figures = await compare("avif");
     console.log("avif", figures.map((f) => f.toFixed(1)).join(" "), "dB");

@@ -48,7 +48,7 @@ test("a link without sense changes nothing", () => {
   expect(fromLink("#az=x&d=NaN&compare=moon&shells=&ev=Infinity&theme=pink", home)).toEqual(home);
 });
 
-test.each(["{", "{}", "null", '{"format":"mirrorbake-web","version":1}'])(
+test.each(["{", "{}", "null", '{"format":"mirrorbake-web","version":2}'])(
   "the manifest %s is refused with a sentence",
   (text) => {
     expect(() => parseManifest(text)).toThrow(/manifest\.json is damaged/);
@@ -56,7 +56,7 @@ test.each(["{", "{}", "null", '{"format":"mirrorbake-web","version":1}'])(
 );
 
 test("a manifest of another version is refused and says so", () => {
-  expect(() => parseManifest('{"format":"mirrorbake-web","version":2}')).toThrow(/version 2/);
+  expect(() => parseManifest('{"format":"mirrorbake-web","version":1}')).toThrow(/version 1/);
 });
 
 test("the probe allows rounding and nothing more", () => {

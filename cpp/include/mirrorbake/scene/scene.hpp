@@ -57,6 +57,10 @@ glm::vec3 texture_lookup(const Texture& texture, glm::vec2 uv);
 /// Mean of all texels.
 glm::vec3 texture_mean(const Texture& texture);
 
+/// All texels of the finest level, row 0 at the top: R, G, B, or one channel that stands for all three.
+/// Throws FileError if the texture's file has changed since it was opened.
+Image texture_image(const Texture& texture);
+
 /// Shape of the specular lobe about the mirror direction: a perfect mirror; microfacets with normals
 /// distributed after Trowbridge and Reitz (GGX; Walter et al., "Microfacet models for refraction through
 /// rough surfaces", EGSR 2007); or (r·l)^N, normalised ([EMT] eq. 17).

@@ -9,8 +9,9 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.files import atomic_output, check_writable
 from mirrorbake.pem.export.glb_file import GlbFile
-from mirrorbake.pem.export.gltf_material import fresnel_description, gltf_material
+from mirrorbake.pem.export.gltf_material import add_textures, fresnel_description, gltf_material
 from mirrorbake.pem.export.map_sets import axis_descriptions, footprint_scale, sample_set, static_set
+from mirrorbake.pem.export.materials import export_materials
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
 
 if TYPE_CHECKING:
@@ -18,11 +19,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mirrorbake.pem.export.map_sets import MapSet, ShellMap
+    from mirrorbake.pem.export.materials import Materials
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.build import BuiltScene
 
 EXTENSION = "EXT_mirrorbake_pem"
 EXTENSION_VERSION = 1
+TEXTURE_SIZE = 2048
+"""Pixels along a side that textures of the material have at most."""
 _BRIGHT_PERCENTILE = 99.0
 
 
@@ -65,6 +69,10 @@ def export_glb(
     file = GlbFile()
     material = built.scene.material(built.scene.object_material(built.reflector))
     described, notes = gltf_material(material)
+    exported = export_materials(built.scene, [built.scene.object_material(built.reflector)])
+    notes += exported.notes
+    described.setdefault("extensions", {})
+    add_textures(described, exported.materials[0], exported.textures, file, TEXTURE_SIZE)
     code = _code_for(sets())
     extension = {
         "version": EXTENSION_VERSION,
@@ -73,7 +81,7 @@ def export_glb(
         "radianceCode": {"low": code.low, "high": code.high, "epsilon": code.epsilon},
         "sets": [_add_set(file, maps, code) for maps in sets()],
     }
-    described.setdefault("extensions", {})[EXTENSION] = {
+    described["extensions"][EXTENSION] = {
         "fresnel": fresnel_description(material.fresnel),
         "layers": material.layers.name,
         "albedo": list(material.albedo),
@@ -81,12 +89,12 @@ def export_glb(
     file.document.update(
         {
             "asset": {"version": "2.0", "generator": f"mirrorbake {_core.version()}"},
-            "extensionsUsed": sorted({EXTENSION, *described["extensions"]}),
+            "extensionsUsed": sorted({EXTENSION, *_extensions_in(described)}),
             "extensions": {EXTENSION: extension},
             "scene": 0,
             "scenes": [{"nodes": [0]}],
             "nodes": [{"name": "reflector", "mesh": 0}],
-            "meshes": [{"name": "reflector", "primitives": _add_mesh(file, store, built)}],
+            "meshes": [{"name": "reflector", "primitives": _add_mesh(file, store, built, exported)}],
             "materials": [described],
         }
     )
@@ -98,6 +106,16 @@ def export_glb(
     for note in notes if report is not None else ():
         assert report is not None
         report(note)
+
+
+def _extensions_in(value: Any) -> set[str]:
+    """Names of the extensions that a part of the document uses."""
+    if isinstance(value, list):
+        return set().union(*(_extensions_in(item) for item in value))
+    if not isinstance(value, dict):
+        return set()
+    names = set(value.get("extensions", {}))
+    return names.union(*(_extensions_in(item) for item in value.values()))
 
 
 def _code_for(sets: Iterator[MapSet]) -> RadianceCode:
@@ -151,7 +169,9 @@ def _proxy(description: dict[str, Any]) -> dict[str, Any]:
     return {names.get(key, key): value for key, value in description.items()}
 
 
-def _add_mesh(file: GlbFile, store: PemStore, built: BuiltScene) -> list[dict[str, Any]]:
+def _add_mesh(
+    file: GlbFile, store: PemStore, built: BuiltScene, materials: Materials
+) -> list[dict[str, Any]]:
     """One primitive per part; in each, triangles on the hull come last."""
     mesh = built.scene.object_mesh(built.reflector)
     attributes = {"POSITION": file.add_vertices(np.asarray(built.positions, np.float32), bounds=True)}
@@ -161,6 +181,10 @@ def _add_mesh(file: GlbFile, store: PemStore, built: BuiltScene) -> list[dict[st
         uvs = np.asarray(mesh.uvs, np.float32) * np.array([1, -1], np.float32)
         uvs[:, 1] += 1.0  # v down
         attributes["TEXCOORD_0"] = file.add_vertices(uvs)
+    # A colour of glTF multiplies the base colour, which is the reflectance of a metal.
+    tinted = max(materials.materials[0].albedo) > 0.0 or materials.materials[0].colors_tint_reflectance
+    if len(mesh.colors) and tinted:
+        attributes["COLOR_0"] = file.add_vertices(np.asarray(mesh.colors, np.float32))
     irradiance = store.read_irradiance()
     if irradiance is not None:
         attributes["_IRRADIANCE"] = file.add_vertices(irradiance)

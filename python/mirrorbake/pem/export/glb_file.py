@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _COMPONENTS = {"float32": 5126, "uint32": 5125}
 _KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 _ARRAY_BUFFER, _ELEMENT_ARRAY_BUFFER = 34962, 34963
+_WRAPS = {"repeat": 10497, "clamp": 33071, "mirror": 33648}
 _LARGEST = 2**32 - 1
 
 
@@ -31,6 +32,8 @@ class GlbFile:
     _views: list[dict[str, int]] = field(default_factory=list)
     _accessors: list[dict[str, Any]] = field(default_factory=list)
     _images: list[dict[str, Any]] = field(default_factory=list)
+    _samplers: list[dict[str, int]] = field(default_factory=list)
+    _textures: list[dict[str, int]] = field(default_factory=list)
     _buffer: bytearray = field(default_factory=bytearray)
 
     def add_vertices(self, values: NDArray[np.float32], *, bounds: bool = False) -> int:
@@ -49,6 +52,15 @@ class GlbFile:
         self._images.append({"name": name, "mimeType": "image/png", "bufferView": view})
         return len(self._images) - 1
 
+    def add_texture(self, name: str, pixels: NDArray[np.uint8], wrap: tuple[str, str]) -> int:
+        """Add an image (H, W, 3) as a texture, wrapped along u and v as named; returns its number."""
+        sampler = {"wrapS": _WRAPS[wrap[0]], "wrapT": _WRAPS[wrap[1]]}
+        if sampler not in self._samplers:
+            self._samplers.append(sampler)
+        source = self.add_png(name, pixels)
+        self._textures.append({"source": source, "sampler": self._samplers.index(sampler)})
+        return len(self._textures) - 1
+
     def to_bytes(self) -> bytes:
         """The file.
 
@@ -62,6 +74,8 @@ class GlbFile:
             "accessors": self._accessors,
             "bufferViews": self._views,
             "images": self._images,
+            "samplers": self._samplers,
+            "textures": self._textures,
             "buffers": [{"byteLength": len(self._buffer)}],
         }
         text = json.dumps({key: value for key, value in document.items() if value != []}).encode()

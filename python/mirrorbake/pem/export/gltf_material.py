@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.fresnel import conductor
+from mirrorbake.pem.export.images import linear_codes, srgb_codes
+from mirrorbake.pem.export.materials import TextureUse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from mirrorbake.pem.export.glb_file import GlbFile
+    from mirrorbake.pem.export.materials import Material, TextureImage
 
 # Schlick and constant reflectances up to that of an index of 2.5 (diamond, titania) are those of dielectrics.
 _LARGEST_DIELECTRIC_R0 = ((2.5 - 1.0) / (2.5 + 1.0)) ** 2
@@ -47,9 +53,37 @@ def gltf_material(material: _core.Material) -> tuple[dict[str, Any], list[str]]:
         result["pbrMetallicRoughness"] = _metallic_roughness(r0, 1.0, roughness)
         if max(albedo) > 0.0:
             notes.append("a metal of glTF has no diffuse colour: the albedo is left out of its material")
-    if material.albedo_texture.texture >= 0 or material.specular_texture.texture >= 0:
-        notes.append("the textures of the reflector's material are left out")
     return result, notes
+
+
+def add_textures(
+    described: dict[str, Any], material: Material, images: Sequence[TextureImage], file: GlbFile, largest: int
+) -> None:
+    """Add the textures of a material to what `gltf_material` returned, at most `largest` pixels wide."""
+
+    def info(use: TextureUse) -> dict[str, Any]:
+        image = images[use.texture]
+        pixels = image.pixels(largest)
+        codes = linear_codes(pixels) if image.linear else srgb_codes(pixels)
+        number = file.add_texture(f"texture {use.texture}", codes, image.wrap)
+        return {"index": number, **_transform(use)}
+
+    surface = described["pbrMetallicRoughness"]
+    base = material.reflectance_texture if surface["metallicFactor"] > 0.0 else material.albedo_texture
+    if base is not None:
+        surface["baseColorTexture"] = info(base)
+    if material.reflectance_texture is not None and base is not material.reflectance_texture:
+        specular = described["extensions"].setdefault("KHR_materials_specular", {})
+        specular["specularColorTexture"] = info(material.reflectance_texture)
+    if material.normal_texture is not None:
+        described["normalTexture"] = {**info(material.normal_texture), "scale": material.normal_scale}
+
+
+def _transform(use: TextureUse) -> dict[str, Any]:
+    if replace(use, texture=0) == TextureUse(0):
+        return {}
+    transform = {"offset": list(use.offset), "rotation": use.rotation, "scale": list(use.scale)}
+    return {"extensions": {"KHR_texture_transform": transform}}
 
 
 def fresnel_description(fresnel: _core.Fresnel) -> dict[str, Any]:

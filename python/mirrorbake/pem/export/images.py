@@ -11,6 +11,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from mirrorbake.arrays import FloatArray
+
 # Slower settings than this one save little: 2 % of the bytes for twice the time.
 AVIF_SPEED = 6
 
@@ -52,6 +54,19 @@ class ImageFormat:
         image = imagecodecs.webp_decode(data) if self.exact else imagecodecs.avif_decode(data)
         image = np.asarray(image, np.uint8)
         return np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image
+
+
+def linear_codes(values: FloatArray) -> NDArray[np.uint8]:
+    """8-bit codes of values in [0, 1], of any shape; others are clipped."""
+    codes: NDArray[np.uint8] = np.rint(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
+    return codes
+
+
+def srgb_codes(linear: FloatArray) -> NDArray[np.uint8]:
+    """8-bit sRGB codes (IEC 61966-2-1) of scene-linear values of any shape, clipped to [0, 1]."""
+    clipped = np.clip(linear, 0.0, 1.0)
+    curve = 1.055 * np.maximum(clipped, 1e-9) ** (1.0 / 2.4) - 0.055
+    return linear_codes(np.where(clipped <= 0.0031308, 12.92 * clipped, curve))
 
 
 def probe_image() -> NDArray[np.uint8]:

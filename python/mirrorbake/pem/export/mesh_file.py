@@ -28,8 +28,14 @@ class ReflectorMesh:
     """(T,) part of every triangle."""
     whole_stack: NDArray[np.bool_]
     """(T,) False for triangles that only the last shell of their part is drawn on: those on the hull."""
-    diffuse: FloatArray | None
-    """(V, 3) radiance that the body reflects before any coat, or None."""
+    uvs: FloatArray
+    """(V, 2) texture coordinates, v up, or (0, 2)."""
+    colors: FloatArray
+    """(V, 3) that multiply the albedo, in [0, 1], or (0, 3)."""
+    materials: NDArray[np.uint16]
+    """(T,) material of every triangle."""
+    irradiance: FloatArray | None
+    """(V, 3) at rest, W/m², or None for a body that is black."""
 
 
 def octahedral(normals: FloatArray) -> NDArray[np.int16]:
@@ -46,40 +52,85 @@ def octahedral(normals: FloatArray) -> NDArray[np.int16]:
     return fractions
 
 
-def write_mesh(mesh: ReflectorMesh, part_count: int) -> tuple[bytes, dict[str, Any]]:
+def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
     """Encode a mesh.
 
-    The triangles are sorted by part, within a part those that carry all shells first.
+    The triangles are sorted by part and material, among them those that carry all shells first.
 
     Returns
     -------
     tuple
-        The file's bytes, and its description for the manifest: `bounds` of the positions, and for each
-        array its type, its number of components and its place in the file after decompression.
+        The file's bytes, and its description for the manifest: `bounds` of positions and texture
+        coordinates, and for each array its type, its number of components and its place in the file after
+        decompression.
     """
-    order = np.lexsort((~mesh.whole_stack, mesh.parts))
+    order = np.lexsort((~mesh.whole_stack, mesh.materials, mesh.parts))
     triangles = mesh.triangles[order]
-    parts, whole = mesh.parts[order], mesh.whole_stack[order]
-    # Vertices in the order of their first use, so that differences of indices are small.
-    used, first = np.unique(triangles, return_index=True)
-    used = used[np.argsort(first)]
+    parts, materials, whole = mesh.parts[order], mesh.materials[order], mesh.whole_stack[order]
+    used = vertex_order(triangles)
     renumbered = np.zeros(len(mesh.positions), np.uint32)
     renumbered[used] = np.arange(len(used), dtype=np.uint32)
     indices = renumbered[triangles].ravel()
 
-    positions = mesh.positions[used].astype(np.float64)
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    extent = np.where(high > low, high - low, 1.0)
-    quantised = np.rint((positions - low) / extent * 65535.0).astype(np.uint16)
+    positions, bounds = _quantised(mesh.positions[used])
     arrays: dict[str, NDArray[Any]] = {
-        "positions": quantised,
+        "positions": positions,
         "indices": np.diff(indices.astype(np.int64), prepend=0).astype(np.int32),
     }
+    description: dict[str, Any] = {"bounds": bounds}
     if len(mesh.normals):
         arrays["normals"] = octahedral(mesh.normals[used])
-    if mesh.diffuse is not None:
-        arrays["diffuse"] = mesh.diffuse[used].astype(np.float16)
+    if len(mesh.uvs):
+        uvs = mesh.uvs[used].astype(np.float64)
+        arrays["uvs"], description["uvBounds"] = _quantised(np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1))
+    if len(mesh.colors):
+        arrays["colors"] = np.rint(np.clip(mesh.colors[used], 0.0, 1.0) * 65535.0).astype(np.uint16)
+    if mesh.irradiance is not None:
+        arrays["irradiance"] = mesh.irradiance[used].astype(np.float16)
+    payload, layout = _pack(arrays)
+    ranges = []
+    for part, material in sorted(set(zip(parts.tolist(), materials.tolist(), strict=True))):
+        members = np.flatnonzero((parts == part) & (materials == material))
+        stacked = int(np.count_nonzero(whole[members]))
+        ranges.append(
+            {
+                "part": part,
+                "material": material,
+                "start": int(members[0]),
+                "stacked": stacked,
+                "count": len(members),
+            }
+        )
+    description |= {"arrays": layout, "ranges": ranges, "bytes": len(payload)}
+    return gzip.compress(payload, 9, mtime=0), description
 
+
+def write_irradiance(irradiance: FloatArray, mesh: ReflectorMesh) -> bytes:
+    """Encode the irradiance (V, 3) of another sample, its vertices in the order of the mesh's file."""
+    order = np.lexsort((~mesh.whole_stack, mesh.materials, mesh.parts))
+    used = vertex_order(mesh.triangles[order])
+    payload, _ = _pack({"irradiance": irradiance[used].astype(np.float16)})
+    return gzip.compress(payload, 9, mtime=0)
+
+
+def vertex_order(triangles: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """Vertices in the order of their first use, so that differences of indices are small."""
+    used, first = np.unique(triangles, return_index=True)
+    ordered: NDArray[np.int64] = used[np.argsort(first)].astype(np.int64)
+    return ordered
+
+
+def _quantised(points: FloatArray) -> tuple[NDArray[np.uint16], dict[str, Any]]:
+    """Return points as 16-bit fractions of their bounds, and the bounds."""
+    wide = points.astype(np.float64)
+    low, high = wide.min(axis=0), wide.max(axis=0)
+    extent = np.where(high > low, high - low, 1.0)
+    fractions = np.rint((wide - low) / extent * 65535.0).astype(np.uint16)
+    return fractions, {"low": low.tolist(), "high": (low + extent).tolist()}
+
+
+def _pack(arrays: dict[str, NDArray[Any]]) -> tuple[bytes, dict[str, Any]]:
+    """Arrays one after the other, and what each one is."""
     payload = bytearray()
     layout: dict[str, Any] = {}
     for name, array in arrays.items():
@@ -93,16 +144,4 @@ def write_mesh(mesh: ReflectorMesh, part_count: int) -> tuple[bytes, dict[str, A
             "offset": len(payload),
         }
         payload += np.ascontiguousarray(planes.transpose(0, 2, 1)).tobytes()
-    ranges = []
-    for part in range(part_count):
-        members = np.flatnonzero(parts == part)
-        start = int(members[0]) if len(members) else 0
-        stacked = int(np.count_nonzero(whole[members]))
-        ranges.append({"start": start, "stacked": stacked, "count": len(members)})
-    description = {
-        "bounds": {"low": low.tolist(), "high": (low + extent).tolist()},
-        "arrays": layout,
-        "parts": ranges,
-        "bytes": len(payload),
-    }
-    return gzip.compress(bytes(payload), 9, mtime=0), description
+    return bytes(payload), layout

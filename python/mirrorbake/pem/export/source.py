@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ class Shell:
     """Texels along a side of the finest level."""
     opaque: bool
     """Whether it has no α: the last one of its part."""
+    moves: bool = False
+    """Whether its shape moves with the object."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,9 @@ class ExportSource:
     still: Callable[[int], FloatArray]
     """`still(sample)`: the ray-traced picture (H, W, 3) of a sample's view, scene-linear."""
     mesh: ReflectorMesh
-    material: dict[str, Any]
+    materials: Materials
+    irradiance: Callable[[int], FloatArray] | None
+    """`irradiance(sample)`: (V, 3) where the diffuse layer changes from sample to sample, else None."""
     static: FloatArray
     """All levels of the static map, (texels, 3)."""
     static_proxy: dict[str, Any]
@@ -75,24 +79,24 @@ def export_source(pem: OpenedPem) -> ExportSource:
         Part(
             part.name,
             tuple(
-                Shell(shell.name, shell.proxy, header.map_size, opaque=shell is part.shells[-1])
+                Shell(shell.name, shell.proxy, header.map_size, shell is part.shells[-1], shell.moves)
                 for shell in part.shells
             ),
         )
         for part in header.parts
     )
-    material = built.scene.material(built.scene.object_material(built.reflector))
     mesh = built.scene.object_mesh(built.reflector)
+    materials = export_materials(built.scene, [built.scene.object_material(built.reflector)])
     local = store.read_local_triangles()
     whole = np.ones(len(built.triangles), np.bool_) if local is None else local != 0
-    irradiance = store.read_irradiance()
-    diffuse, notes = None, []
-    if irradiance is not None:
-        diffuse = (irradiance * (np.array(material.albedo) / math.pi)).astype(np.float32)
-        if material.albedo_texture.texture >= 0:
-            notes.append("the texture of the diffuse layer is left out: its colour is the material's albedo")
-    if material.specular_texture.texture >= 0:
-        notes.append("the texture of the reflectance is left out")
+
+    def irradiance(sample: int) -> FloatArray:
+        values = store.read_irradiance(sample)
+        assert values is not None
+        return values
+
+    first = store.read_irradiance()
+    changes = first is not None and store.has_irradiance_per_sample
 
     def pyramid(sample: int, part: int, shell: int) -> FloatArray:
         return store.read_map(parts[part].name, parts[part].shells[shell].name, sample)
@@ -109,22 +113,20 @@ def export_source(pem: OpenedPem) -> ExportSource:
             triangles=built.triangles,
             parts=built.parts,
             whole_stack=whole,
-            diffuse=diffuse,
+            uvs=np.asarray(mesh.uvs),
+            colors=np.asarray(mesh.colors),
+            materials=np.zeros(len(built.triangles), np.uint16),
+            irradiance=first,
         ),
-        material={
-            "fresnel": material.fresnel.model.name,
-            "r0": list(material.fresnel.r0),
-            "eta": list(material.fresnel.eta),
-            "k": list(material.fresnel.k),
-            "coated": material.layers == _core.LayerModel.coated,
-        },
+        materials=materials,
+        irradiance=irradiance if changes else None,
         static=_core.build_cube_pyramid(store.read_capture()),
         static_proxy=header.static["proxy"] or header.static["infinite"],
         static_size=header.map_size,
         camera=_camera(pem),
         run_time=run_time_attributes(pem.run_time.model),
         title=_title(header.source.config),
-        notes=tuple(notes),
+        notes=materials.notes,
     )
 
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.pem.export.images import ImageFormat, probe_image
-from mirrorbake.pem.export.mesh_file import write_mesh
+from mirrorbake.pem.export.images import ImageFormat, linear_codes, probe_image, srgb_codes
+from mirrorbake.pem.export.mesh_file import write_irradiance, write_mesh
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
 
 if TYPE_CHECKING:
@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.export.materials import Material, TextureUse
     from mirrorbake.pem.export.source import ExportSource
 
 FORMAT_NAME = "mirrorbake-web"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 MANIFEST_NAME = "manifest.json"
 
 PROBED_SAMPLES = 16
@@ -42,6 +43,8 @@ class WebOptions:
     """Also write images without loss, which the page takes if a browser shows the others wrongly."""
     stills: bool = True
     """The ray-traced pictures of the samples, to compare with."""
+    texture_size: int = 1024
+    """Pixels along a side that textures of the materials have at most."""
 
     @property
     def has_fallback(self) -> bool:
@@ -84,7 +87,7 @@ class WebPem:
     def _collect(self) -> None:
         source, options, code = self._source, self._options, self._code
         form = options.format
-        mesh, layout = write_mesh(source.mesh, len(source.parts))
+        mesh, layout = write_mesh(source.mesh)
         probe = form.encode(probe_image())
         manifest = json.dumps(self._manifest(layout, probe), separators=(",", ":")) + "\n"
         self._makers[MANIFEST_NAME] = manifest.encode
@@ -92,8 +95,12 @@ class WebPem:
         self._makers["probe" + form.suffix] = lambda: probe
         self._makers["mesh.bin.gz"] = lambda: mesh
         self._add("static/capture", lambda: to_atlas(code.encode(source.static), source.static_size))
+        for t in range(len(source.materials.textures)):
+            self._add(_texture_name(t), partial(self._texture, t))
         # The sample that is shown first, then outwards from it.
         for i in sorted(range(len(source.space)), key=lambda i: abs(i - self._first)):
+            if source.irradiance is not None:
+                self._makers[_irradiance_name(i)] = partial(self._irradiance, i)
             for p, part in enumerate(source.parts):
                 for s, shell in enumerate(part.shells):
                     name = _map_name(i, p, s)
@@ -122,6 +129,15 @@ class WebPem:
         alpha = np.rint(np.clip(pyramid[:, 3:4], 0.0, 1.0) * 255.0).astype(np.uint8)
         return to_atlas(alpha, self._source.parts[part].shells[shell].size)[..., 0]
 
+    def _texture(self, number: int) -> NDArray[np.uint8]:
+        texture = self._source.materials.textures[number]
+        pixels = texture.pixels(self._options.texture_size)
+        return linear_codes(pixels) if texture.linear else srgb_codes(pixels)
+
+    def _irradiance(self, sample: int) -> bytes:
+        assert self._source.irradiance is not None
+        return write_irradiance(self._source.irradiance(sample), self._source.mesh)
+
     def _still(self, sample: int) -> NDArray[np.uint8]:
         return self._code.encode(self._source.still(sample))
 
@@ -137,7 +153,11 @@ class WebPem:
             "axes": source.space.to_attributes(),
             "camera": source.camera,
             "motion": source.motion,
-            "material": source.material,
+            "materials": [_material(material) for material in source.materials.materials],
+            "textures": [
+                {"image": _texture_name(t), "wrap": list(texture.wrap), "linear": texture.linear}
+                for t, texture in enumerate(source.materials.textures)
+            ],
             "radiance": {"low": self._code.low, "high": self._code.high, "epsilon": self._code.epsilon},
             "images": {
                 "suffix": form.suffix,
@@ -156,7 +176,13 @@ class WebPem:
                 {
                     "name": part.name,
                     "shells": [
-                        {"name": s.name, "size": s.size, "opaque": s.opaque, "proxy": s.proxy}
+                        {
+                            "name": s.name,
+                            "size": s.size,
+                            "opaque": s.opaque,
+                            "proxy": s.proxy,
+                            "moves": s.moves,
+                        }
                         for s in part.shells
                     ],
                 }
@@ -177,11 +203,48 @@ class WebPem:
             for p, part in enumerate(self._source.parts)
         ]
         still = _still_name(i) if self._options.stills else None
-        return {"parameter": list(self._source.space.sample(i)), "maps": maps, "still": still}
+        return {
+            "parameter": list(self._source.space.sample(i)),
+            "maps": maps,
+            "still": still,
+            "irradiance": None if self._source.irradiance is None else _irradiance_name(i),
+        }
 
 
 def _map_name(sample: int, part: int, shell: int) -> str:
     return f"samples/{sample:05d}/{part}.{shell}"
+
+
+def _material(material: Material) -> dict[str, Any]:
+    """Plain values of what the page needs to know of a material."""
+
+    def use(texture: TextureUse | None) -> dict[str, Any] | None:
+        return None if texture is None else {"texture": texture.texture, "matrix": list(texture.matrix)}
+
+    fresnel = material.fresnel
+    return {
+        "name": material.name,
+        "specular": material.specular,
+        "fresnel": fresnel.model.name,
+        "r0": list(fresnel.r0),
+        "eta": list(fresnel.eta),
+        "k": list(fresnel.k),
+        "coated": material.coated,
+        "albedo": list(material.albedo),
+        "albedoTexture": use(material.albedo_texture),
+        "reflectanceTexture": use(material.reflectance_texture),
+        "normalTexture": use(material.normal_texture),
+        "normalScale": material.normal_scale,
+        "colorsTintReflectance": material.colors_tint_reflectance,
+    }
+
+
+def _texture_name(number: int) -> str:
+    return f"textures/{number}"
+
+
+def _irradiance_name(sample: int) -> str:
+    return f"samples/{sample:05d}/irradiance.bin.gz"
 
 
 def _still_name(sample: int) -> str:
@@ -190,16 +253,7 @@ def _still_name(sample: int) -> str:
 
 def display_codes(radiance: FloatArray) -> NDArray[np.uint8]:
     """Scene-linear radiance as the page shows it, 8-bit sRGB after Khronos' neutral tone mapping."""
-    encoded = _srgb(neutral_tone_map(radiance))
-    codes: NDArray[np.uint8] = np.rint(255.0 * encoded).astype(np.uint8)
-    return codes
-
-
-def _srgb(linear: FloatArray) -> FloatArray:
-    clipped = np.clip(linear, 0.0, 1.0)
-    return np.where(
-        clipped <= 0.0031308, 12.92 * clipped, 1.055 * np.maximum(clipped, 1e-9) ** (1.0 / 2.4) - 0.055
-    )
+    return srgb_codes(neutral_tone_map(radiance))
 
 
 def neutral_tone_map(radiance: FloatArray) -> FloatArray:

@@ -84,9 +84,9 @@ def density_table() -> None:
     ]
     rows, columns = (np.arange(512) - 255.5)[:, None], (np.arange(512) - 255.5)[None, :]
     inside = np.hypot(np.abs(rows) + 0.5, np.abs(columns) + 0.5) <= 256
-    for projection in ("cube", "dual_paraboloid", "sphere_map", "angular", "latlong"):
+    for projection in ("cube", "dual_paraboloid", "sphere_map", "angular", "latlong", "equal_area"):
         angles = texel_solid_angles(projection, 512, 512)
-        if projection not in ("cube", "latlong"):
+        if projection not in ("cube", "latlong", "equal_area"):
             angles = angles[inside]
         low, high = angles.min(), angles.max()
         lines.append(f"| `{projection}` | {1e6 * low:.3g} | {1e6 * high:.3g} | {high / low:.3g} |")
@@ -128,7 +128,8 @@ def draw() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     density_table()
     panorama = labelled_panorama(512)
-    panorama.resample("latlong", 160).save(FOLDER / "latlong.png")
+    for projection in ("latlong", "equal_area"):
+        panorama.resample(projection, 160).save(FOLDER / f"{projection}.png")
     for projection in ("sphere_map", "angular", "fisheye"):
         panorama.resample(projection, 256).save(FOLDER / f"{projection}.png")
     panorama.resample("dual_paraboloid", 256).save(FOLDER / "dual_paraboloid.png")

@@ -31,7 +31,7 @@ struct Input {
   void add_details(CLI::App& app, const std::string& whose = "the input") {
     app.add_option("--from", projection,
                    "projection of " + whose +
-                       ": cube, latlong, dual_paraboloid, sphere_map, angular, fisheye:DEGREES "
+                       ": cube, latlong, equal_area, dual_paraboloid, sphere_map, angular, fisheye:DEGREES "
                        "(default: by the shape of the image)");
     app.add_option("--from-layout", layout,
                    "how faces share the image: strip, column, grid, cross, vertical_cross")

@@ -455,8 +455,9 @@ struct Capture {
     for (const char* name : {"--crop", "--camera", "--eye", "--target", "--fov"}) {
       app.remove_option(app.get_option(name));
     }
-    app.add_option("--to", projection,
-                   "projection: cube, latlong, dual_paraboloid, sphere_map, angular, fisheye:DEGREES")
+    app.add_option(
+           "--to", projection,
+           "projection: cube, latlong, equal_area, dual_paraboloid, sphere_map, angular, fisheye:DEGREES")
         ->capture_default_str();
     app.add_option("--origin", origin, "x y z of the point to look from, metres (default: 0 0 0)")
         ->type_size(3)

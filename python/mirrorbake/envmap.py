@@ -181,7 +181,7 @@ class EnvMap:
         projection
             Name of the projection to make.
         size
-            Height of a face, or (height, width). A latlong is twice as wide as it is high.
+            Height of a face, or (height, width). A latlong and an equal_area are twice as wide as high.
         filter
             ``area``: exact mean over the area of a texel; ``bilinear``; ``nearest``; ``automatic``: area
             where the map shrinks, interpolation where it grows.

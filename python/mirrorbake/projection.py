@@ -1,8 +1,8 @@
 """The projections of the sphere: positions in maps from directions, directions from positions, solid angles.
 
-A projection is named by a string: ``cube``, ``dual_paraboloid``, ``sphere_map``, ``latlong``, ``angular``,
-``fisheye`` (180°) or ``fisheye:DEGREES``. Positions (x, y) run to the right and up, both in [-1, 1] from the
-centre of a face.
+A projection is named by a string: ``cube``, ``dual_paraboloid``, ``sphere_map``, ``latlong``, ``equal_area``,
+``angular``, ``fisheye`` (180°) or ``fisheye:DEGREES``. Positions (x, y) run to the right and up, both in
+[-1, 1] from the centre of a face.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ def height_and_width(projection: str, size: int | tuple[int, int]) -> tuple[int,
             height, width = (index(side) for side in size)
         else:
             height = index(size)
-            width = 2 * height if projection == "latlong" else height
+            width = 2 * height if projection in ("latlong", "equal_area") else height
     except (TypeError, ValueError):
         raise _core.InvalidArgument(f"size is {size!r}, expected a height, or (height, width)") from None
     if max(height, width) > _MAX_SIDE:

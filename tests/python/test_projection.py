@@ -8,7 +8,7 @@ from hypothesis.extra import numpy as hnp
 
 from mirrorbake import projection as pr
 
-PROJECTIONS = ["cube", "dual_paraboloid", "latlong", "angular", "fisheye:360"]
+PROJECTIONS = ["cube", "dual_paraboloid", "latlong", "equal_area", "angular", "fisheye:360"]
 COMPONENT = st.floats(-(2.0**100), 2.0**100, width=32, allow_subnormal=True)
 
 

@@ -66,7 +66,7 @@ std::vector<double> integrate(const EnvMapView& map, int level) {
   const int width = map.layout.level_width(level);
   const int height = map.layout.level_height(level);
   // A table of a wide panorama would take more memory than its values.
-  const bool rows_alike = map.layout.projection.kind == ProjectionKind::latlong;
+  const bool rows_alike = is_panorama(map.layout.projection.kind);
   std::vector<double> angles;
   if (!rows_alike) angles = texel_solid_angles(map.layout.projection, width, height);
   const std::span<const float> values = map.level(level);

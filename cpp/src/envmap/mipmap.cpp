@@ -159,7 +159,7 @@ SeamReport measure_seam(const EnvMapView& map, int level) {
   const int width = layout.level_width(level);
   const int height = layout.level_height(level);
   const bool cube = layout.projection.kind == ProjectionKind::cube;
-  const bool wraps = cube || layout.projection.kind == ProjectionKind::latlong;
+  const bool wraps = cube || is_panorama(layout.projection.kind);
   SeamReport report;
   const auto compare = [&](std::size_t a, std::size_t b, float& largest) {
     for (std::size_t c = 0; c < static_cast<std::size_t>(layout.channels); ++c) {

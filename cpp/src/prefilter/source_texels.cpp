@@ -18,8 +18,8 @@ SourceTexels::SourceTexels(const EnvMapLayout& layout, int parts)
       parts_(parts),
       width_(layout.width * parts),
       height_(layout.height * parts),
-      is_latlong_(layout.projection.kind == ProjectionKind::latlong) {
-  if (!is_latlong_) {
+      is_panorama_(is_panorama(layout.projection.kind)) {
+  if (!is_panorama_) {
     angles_ = texel_solid_angles(projection_, width_, height_);
     return;
   }
@@ -27,16 +27,20 @@ SourceTexels::SourceTexels(const EnvMapLayout& layout, int parts)
   for (int row = 0; row < height_; ++row) {
     angles_[static_cast<std::size_t>(row)] = texel_solid_angle(projection_, width_, height_, 0, row);
   }
-  const auto add = [&](double angle) {
-    sines_.push_back(std::sin(angle));
-    cosines_.push_back(std::cos(angle));
-  };
-  for (int column = 0; column < width_; ++column) add(std::numbers::pi * column_center(column, width_));
-  for (int row = 0; row < height_; ++row) add(0.5 * std::numbers::pi * row_center(row, height_));
+  for (int column = 0; column < width_; ++column) {
+    const double longitude = std::numbers::pi * column_center(column, width_);
+    sines_.push_back(std::sin(longitude));
+    cosines_.push_back(std::cos(longitude));
+  }
+  for (int row = 0; row < height_; ++row) {
+    const glm::dvec3 middle = direction_from_point(projection_, 0, 0.0, row_center(row, height_));
+    sines_.push_back(middle.y);
+    cosines_.push_back(-middle.z);
+  }
 }
 
 glm::dvec3 SourceTexels::direction(int face, int row, int column) const {
-  if (!is_latlong_) {
+  if (!is_panorama_) {
     return direction_from_point(projection_, face, column_center(column, width_), row_center(row, height_));
   }
   const std::size_t longitude = static_cast<std::size_t>(column);
@@ -48,6 +52,9 @@ glm::dvec3 SourceTexels::direction(int face, int row, int column) const {
 double texel_width(const EnvMapLayout& layout) {
   const double pi = std::numbers::pi;
   switch (layout.projection.kind) {
+    case ProjectionKind::equal_area:
+      // The height of the texels at the poles, √(4/height), would be that of two rows alone.
+      return std::max(2.0 * pi / layout.width, 4.0 / layout.height);
     case ProjectionKind::latlong: return std::max(2.0 * pi / layout.width, pi / layout.height);
     case ProjectionKind::cube: return 2.0 / layout.width;
     case ProjectionKind::dual_paraboloid:

@@ -22,9 +22,9 @@ class SourceTexels {
   glm::dvec3 direction(int face, int row, int column) const;
   /// Steradians; 0 outside of the disc of round maps.
   double solid_angle(int row, int column) const {
-    return is_latlong_ ? angles_[static_cast<std::size_t>(row)]
-                       : angles_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
-                                 static_cast<std::size_t>(column)];
+    return is_panorama_ ? angles_[static_cast<std::size_t>(row)]
+                        : angles_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
+                                  static_cast<std::size_t>(column)];
   }
 
  private:
@@ -32,7 +32,7 @@ class SourceTexels {
   int parts_;
   int width_;
   int height_;
-  bool is_latlong_;
+  bool is_panorama_;
   std::vector<double> angles_;
   std::vector<double> sines_;  ///< of the longitudes and then of the latitudes, of a latlong
   std::vector<double> cosines_;

@@ -16,6 +16,7 @@
 #include "mirrorbake/core/text.hpp"
 #include "mirrorbake/projection/cube.hpp"
 #include "mirrorbake/projection/dual_paraboloid.hpp"
+#include "mirrorbake/projection/equal_area.hpp"
 #include "mirrorbake/projection/fisheye.hpp"
 #include "mirrorbake/projection/latlong.hpp"
 #include "mirrorbake/projection/sphere_map.hpp"
@@ -26,13 +27,14 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-constexpr std::array<std::pair<ProjectionKind, std::string_view>, 6> kNames = {{
+constexpr std::array<std::pair<ProjectionKind, std::string_view>, 7> kNames = {{
     {ProjectionKind::cube, "cube"},
     {ProjectionKind::dual_paraboloid, "dual_paraboloid"},
     {ProjectionKind::sphere_map, "sphere_map"},
     {ProjectionKind::latlong, "latlong"},
     {ProjectionKind::angular, "angular"},
     {ProjectionKind::fisheye, "fisheye"},
+    {ProjectionKind::equal_area, "equal_area"},
 }};
 
 double field_of_view_radians(const Projection& p) {
@@ -55,8 +57,9 @@ Projection parse_projection(std::string_view text) {
     validate(projection);
     return projection;
   }
-  throw InvalidArgument("projection", text,
-                        "cube, dual_paraboloid, sphere_map, latlong, angular, fisheye or fisheye:DEGREES");
+  throw InvalidArgument(
+      "projection", text,
+      "cube, dual_paraboloid, sphere_map, latlong, equal_area, angular, fisheye or fisheye:DEGREES");
 }
 
 std::string to_string(const Projection& projection) {
@@ -85,9 +88,7 @@ int face_count(const Projection& projection) {
                                                               : 1;
 }
 
-int natural_aspect(const Projection& projection) {
-  return projection.kind == ProjectionKind::latlong ? 2 : 1;
-}
+int natural_aspect(const Projection& projection) { return is_panorama(projection.kind) ? 2 : 1; }
 
 MapPoint point_from_direction(const Projection& p, glm::dvec3 d) {
   switch (p.kind) {
@@ -95,6 +96,7 @@ MapPoint point_from_direction(const Projection& p, glm::dvec3 d) {
     case ProjectionKind::dual_paraboloid: return dual_paraboloid_from_direction(d);
     case ProjectionKind::sphere_map: return sphere_map_from_direction(d);
     case ProjectionKind::latlong: return latlong_from_direction(d);
+    case ProjectionKind::equal_area: return equal_area_from_direction(d);
     case ProjectionKind::angular:
     case ProjectionKind::fisheye: return fisheye_from_direction(d, field_of_view_radians(p));
   }
@@ -124,7 +126,8 @@ std::optional<glm::dvec2> point_on_face(const Projection& p, int face, glm::dvec
       return across == 0.0 ? glm::dvec2(radius, 0.0) : radius / across * glm::dvec2(d);
     }
     case ProjectionKind::sphere_map:
-    case ProjectionKind::latlong: {
+    case ProjectionKind::latlong:
+    case ProjectionKind::equal_area: {
       const MapPoint point = point_from_direction(p, d);
       return glm::dvec2(point.x, point.y);
     }
@@ -138,6 +141,7 @@ glm::dvec3 direction_from_point(const Projection& p, int face, double x, double 
     case ProjectionKind::dual_paraboloid: return direction_from_dual_paraboloid(face, x, y);
     case ProjectionKind::sphere_map: return direction_from_sphere_map(x, y);
     case ProjectionKind::latlong: return direction_from_latlong(x, y);
+    case ProjectionKind::equal_area: return direction_from_equal_area(x, y);
     case ProjectionKind::angular:
     case ProjectionKind::fisheye: return direction_from_fisheye(x, y, field_of_view_radians(p));
   }
@@ -150,6 +154,7 @@ MapJacobian map_jacobian(const Projection& p, int face, double x, double y) {
     case ProjectionKind::dual_paraboloid: return dual_paraboloid_jacobian(face, x, y);
     case ProjectionKind::sphere_map: return sphere_map_jacobian(x, y);
     case ProjectionKind::latlong: return latlong_jacobian(x, y);
+    case ProjectionKind::equal_area: return equal_area_jacobian(x, y);
     case ProjectionKind::angular:
     case ProjectionKind::fisheye: return fisheye_jacobian(x, y, field_of_view_radians(p));
   }
@@ -173,6 +178,7 @@ double texel_solid_angle(const Projection& p, int width, int height, int column,
       const double middle = 0.25 * kPi * (r.y0 + r.y1);
       return 2.0 * kPi / width * 2.0 * std::cos(middle) * std::sin(0.5 * kPi / height);
     }
+    case ProjectionKind::equal_area: return 4.0 * kPi / (static_cast<double>(width) * height);
     case ProjectionKind::dual_paraboloid:
       return integrate_in_disc(r, [](double r2) { return 4.0 / ((1.0 + r2) * (1.0 + r2)); });
     case ProjectionKind::sphere_map: return integrate_in_disc(r, [](double) { return 4.0; });
@@ -197,7 +203,7 @@ std::vector<double> texel_solid_angles(const Projection& p, int width, int heigh
   parallel_for(static_cast<std::size_t>(height), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       double* out = angles.data() + row * static_cast<std::size_t>(width);
-      if (p.kind == ProjectionKind::latlong) {
+      if (is_panorama(p.kind)) {
         std::fill_n(out, width, texel_solid_angle(p, width, height, 0, static_cast<int>(row)));
         continue;
       }

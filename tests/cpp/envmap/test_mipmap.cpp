@@ -25,7 +25,8 @@ EnvMap noise(const char* projection, int width, int height) {
 }
 
 TEST(Mipmap, WeightedLevelsKeepTheMeanRadianceOfEveryProjectionAndSize) {
-  for (const char* projection : {"cube", "latlong", "dual_paraboloid", "sphere_map", "angular"}) {
+  for (const char* projection :
+       {"cube", "latlong", "dual_paraboloid", "sphere_map", "angular", "equal_area"}) {
     for (const int size : {1, 6, 13, 64}) {
       const EnvMap map = noise(projection, size, size);
       for (const MipFilter filter : {MipFilter::solid_angle, MipFilter::seamless}) {
@@ -82,7 +83,7 @@ TEST(Mipmap, SeamsShowWithTheBoxFilterAndVanishWithTheSeamlessOne) {
 }
 
 TEST(Mipmap, AConstantMapStaysConstant) {
-  for (const char* projection : {"cube", "latlong", "dual_paraboloid", "angular"}) {
+  for (const char* projection : {"cube", "latlong", "dual_paraboloid", "angular", "equal_area"}) {
     EnvMap map = make_envmap({parse_projection(projection), 21, 21, 1, 1});
     std::fill(map.values.begin(), map.values.end(), 0.3F);
     for (const MipFilter filter : {MipFilter::box, MipFilter::solid_angle, MipFilter::seamless}) {
@@ -93,7 +94,7 @@ TEST(Mipmap, AConstantMapStaysConstant) {
 
 TEST(Border, HoldsTheNeighboursTexels) {
   for (const char* projection :
-       {"cube", "latlong", "dual_paraboloid", "angular", "sphere_map", "fisheye:180"}) {
+       {"cube", "latlong", "dual_paraboloid", "angular", "sphere_map", "fisheye:180", "equal_area"}) {
     constexpr int kSize = 16;
     constexpr int kBorder = 3;
     constexpr int kWide = kSize + 2 * kBorder;

@@ -20,8 +20,8 @@
 namespace mirrorbake {
 namespace {
 
-constexpr const char* kProjections[] = {"cube",    "dual_paraboloid", "sphere_map",
-                                        "latlong", "angular",         "fisheye:360"};
+constexpr const char* kProjections[] = {"cube",    "dual_paraboloid", "sphere_map", "latlong",
+                                        "angular", "fisheye:360",     "equal_area"};
 
 // Value f(direction) in the centre of every texel.
 template <typename F>

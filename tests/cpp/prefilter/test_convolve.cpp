@@ -112,7 +112,8 @@ TEST(Convolve, ATableIsTheLobeItWasMadeFrom) {
 }
 
 TEST(Convolve, WhiteStaysWhiteForEveryLobeAndProjection) {
-  for (const char* projection : {"latlong", "cube", "dual_paraboloid", "angular", "sphere_map"}) {
+  for (const char* projection :
+       {"latlong", "cube", "dual_paraboloid", "angular", "sphere_map", "equal_area"}) {
     EnvMap map = make_envmap({parse_projection(projection), 16, 16, 1, 4});
     std::fill(map.values.begin(), map.values.end(), 0.7F);
     Convolver convolver(map);

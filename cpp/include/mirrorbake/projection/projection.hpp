@@ -13,11 +13,11 @@
 
 #include "mirrorbake/projection/map_point.hpp"
 
-/// All projections behind one interface (spec P1–P6). Computed in double; the batch functions read and write
+/// All projections behind one interface (spec P1–P6, P8). Computed in double; the batch functions read and write
 /// float32.
 namespace mirrorbake {
 
-enum class ProjectionKind { cube, dual_paraboloid, sphere_map, latlong, angular, fisheye };
+enum class ProjectionKind { cube, dual_paraboloid, sphere_map, latlong, angular, fisheye, equal_area };
 
 struct Projection {
   ProjectionKind kind = ProjectionKind::latlong;
@@ -26,8 +26,8 @@ struct Projection {
   bool operator==(const Projection&) const = default;
 };
 
-/// "cube", "dual_paraboloid", "sphere_map", "latlong", "angular", "fisheye", or "fisheye:DEGREES". Throws
-/// InvalidArgument.
+/// "cube", "dual_paraboloid", "sphere_map", "latlong", "angular", "fisheye",
+/// "fisheye:DEGREES" or "equal_area". Throws InvalidArgument.
 Projection parse_projection(std::string_view text);
 std::string to_string(const Projection& projection);
 
@@ -36,7 +36,13 @@ void validate(const Projection& projection);
 
 int face_count(const Projection& projection);
 
-/// Width over height that makes texels roughly square: 2 for latlong, 1 otherwise.
+/// Whether columns are longitudes, as of latlong and equal_area: the left side goes on at the right one, and
+/// the texels of a row are alike.
+constexpr bool is_panorama(ProjectionKind kind) {
+  return kind == ProjectionKind::latlong || kind == ProjectionKind::equal_area;
+}
+
+/// Width over height that makes texels roughly square: 2 for panoramas, 1 otherwise.
 int natural_aspect(const Projection& projection);
 
 MapPoint point_from_direction(const Projection& projection, glm::dvec3 direction);

@@ -13,7 +13,7 @@ LineTables::LineTables(const Projection& target, std::vector<double> x_) : x(std
   for (const double at : x) {
     if (target.kind == ProjectionKind::cube) u.push_back(at);
     if (target.kind == ProjectionKind::dual_paraboloid) u.push_back(at), v.push_back(at * at);
-    if (target.kind == ProjectionKind::latlong) {
+    if (is_panorama(target.kind)) {
       u.push_back(std::sin(std::numbers::pi * at));
       v.push_back(std::cos(std::numbers::pi * at));
     }
@@ -65,11 +65,12 @@ void LineLookup::set_directions(int face, double y, std::size_t first, std::size
       q = 0.5 * (right - left);
       break;
     }
-    case ProjectionKind::latlong: {
-      const double latitude = 0.5 * std::numbers::pi * y;
-      p = glm::dvec3(0.0, std::sin(latitude), 0.0);
-      q = glm::dvec3(std::cos(latitude), 0.0, 0.0);
-      r = glm::dvec3(0.0, 0.0, -std::cos(latitude));
+    case ProjectionKind::latlong:
+    case ProjectionKind::equal_area: {
+      const glm::dvec3 middle = at(0.0);  // towards −Z at this latitude
+      p = glm::dvec3(0.0, middle.y, 0.0);
+      q = glm::dvec3(-middle.z, 0.0, 0.0);
+      r = glm::dvec3(0.0, 0.0, middle.z);
       break;
     }
     case ProjectionKind::dual_paraboloid: {

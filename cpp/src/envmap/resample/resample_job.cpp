@@ -35,7 +35,8 @@ TexelDensity density_of(const EnvMapLayout& layout) {
       density.scale = density.half_angle * density.half_angle * area;
       break;
     case ProjectionKind::sphere_map: density.scale = 4.0 * area; break;
-    case ProjectionKind::latlong: break;  // by row
+    case ProjectionKind::latlong:
+    case ProjectionKind::equal_area: break;  // by row
   }
   return density;
 }
@@ -83,7 +84,7 @@ double ResampleJob::weight(int row, int column) const {
 }
 
 DiscExtent disc_extent(ProjectionKind kind, glm::dvec2 low, glm::dvec2 high) {
-  if (kind == ProjectionKind::cube || kind == ProjectionKind::latlong) return DiscExtent::inside;
+  if (kind == ProjectionKind::cube || is_panorama(kind)) return DiscExtent::inside;
   const glm::dvec2 a = glm::min(low, high);
   const glm::dvec2 b = glm::max(low, high);
   const glm::dvec2 nearest = glm::clamp(glm::dvec2(0.0), a, b);

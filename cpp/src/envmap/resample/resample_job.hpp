@@ -27,7 +27,7 @@ struct ResampleJob {
   int width() const { return source.width; }
   int height() const { return source.height; }
   const Projection& projection() const { return source.projection; }
-  bool is_periodic() const { return source.projection.kind == ProjectionKind::latlong; }
+  bool is_periodic() const { return is_panorama(source.projection.kind); }
 
   std::span<const double> row_weights() const {
     return is_periodic() ? std::span<const double>(weights) : std::span<const double>();

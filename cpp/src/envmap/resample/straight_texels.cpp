@@ -24,6 +24,7 @@ double longest_part(const EnvMapLayout& source) {
     case ProjectionKind::dual_paraboloid:
     case ProjectionKind::sphere_map: width *= 0.5; break;
     case ProjectionKind::latlong:
+    case ProjectionKind::equal_area:
     case ProjectionKind::angular: width /= std::numbers::pi; break;
     case ProjectionKind::fisheye:
       width /= 0.5 * glm::radians(static_cast<double>(source.projection.field_of_view));
@@ -54,6 +55,7 @@ StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& t
     // the target away from one shift 1/(12 n) of the area, which is lost or counted twice beside a texel that
     // is traced. Towards the rim of a sphere map all images are so.
     case ProjectionKind::latlong:
+    case ProjectionKind::equal_area:
       return {target.projection.kind == ProjectionKind::sphere_map ? 0.03 : 0.1, kAny, length};
     case ProjectionKind::cube:
     case ProjectionKind::dual_paraboloid: return {0.01, kAny, length};

@@ -59,7 +59,7 @@ std::optional<FaceMap> face_map(const EnvMapLayout& layout, const glm::dmat3& ax
     if (!image || (i > 0 && image->face != map.face)) return std::nullopt;
     map.face = image->face;
     images[i] = image->point;
-    if (layout.projection.kind == ProjectionKind::latlong && i > 0) {
+    if (is_panorama(layout.projection.kind) && i > 0) {
       images[i].x -= 2.0 * std::round(0.5 * (images[i].x - images[0].x));
     }
   }
@@ -76,7 +76,7 @@ std::optional<FaceMap> face_map(const EnvMapLayout& layout, const glm::dmat3& ax
   const glm::dvec2 shift = images[0] - kPoints[0].x * by_x - kPoints[0].y * by_y;
   for (std::size_t i = 3; i < kPoints.size(); ++i) {
     glm::dvec2 error = kPoints[i].x * by_x + kPoints[i].y * by_y + shift - images[i];
-    if (layout.projection.kind == ProjectionKind::latlong) error.x -= 2.0 * std::round(0.5 * error.x);
+    if (is_panorama(layout.projection.kind)) error.x -= 2.0 * std::round(0.5 * error.x);
     if (!(std::abs(error.x) + std::abs(error.y) < kTolerance)) return std::nullopt;
   }
   // Columns go with x, rows against y; the first texel's centre is at (1/width − 1, 1 − 1/height).
@@ -91,7 +91,7 @@ std::optional<FaceMap> face_map(const EnvMapLayout& layout, const glm::dmat3& ax
   if (!column || !row) return std::nullopt;
   map.row_offset = *row;
   map.column_offset = *column;
-  if (layout.projection.kind == ProjectionKind::latlong) {
+  if (is_panorama(layout.projection.kind)) {
     map.column_offset = ((*column % layout.width) + layout.width) % layout.width;
   }
   return map;

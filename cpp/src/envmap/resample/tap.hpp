@@ -17,7 +17,7 @@ struct Tap {
 
 /// continued() on the finest level, without its trigonometry where that is known.
 inline FaceTexel place_at(const EnvMapLayout& layout, int face, int row, int column) {
-  if (layout.projection.kind == ProjectionKind::latlong) {
+  if (is_panorama(layout.projection.kind)) {
     // Beyond a pole lies what is half a turn away.
     const bool beyond = row < 0 || row >= layout.height;
     if (row < 0) row = -1 - row;

@@ -7,6 +7,7 @@ placed in float64 and read by `EnvMap.sample`. The peer is the card's own `textu
 same texels, with as much anisotropy as there are taps. Times are of a frame of 1024² lookups.
 """
 
+import importlib
 import re
 import sys
 import time
@@ -159,8 +160,7 @@ def footprints(random: np.random.Generator) -> list[NDArray[np.float32]]:
 
 def cases() -> Iterator[Case]:
     try:
-        import moderngl
-
+        moderngl = importlib.import_module("moderngl")
         context = moderngl.create_standalone_context(backend="egl")
     except Exception as failure:  # moderngl raises whatever its backend does
         sys.exit(f"bench: skipped: there is no graphics card and no Mesa to be had through EGL ({failure})")
@@ -196,10 +196,10 @@ def cases() -> Iterator[Case]:
         for unit, (name, texture) in enumerate(textures.items()):
             if name in program:
                 texture.use(unit)
-                program[name].value = unit
+                program[name] = unit
         for name, value in values.items():
             if name in program:
-                program[name].value = value
+                program[name] = value
         triangle = context.vertex_array(program, [])
         triangle.render(moderngl.TRIANGLES, vertices=3)
         pixels = np.frombuffer(target.read(components=3, dtype="f4"), np.float32)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -137,3 +138,27 @@ def test_values_that_are_not_finite_are_counted() -> None:
     image[0, 0] = np.nan
     with pytest.raises(InvalidArgument, match="3 NaN or infinite values"):
         Prefilter(EnvMap.from_array(image, "latlong"))
+
+
+def test_half_precision_goes_in_and_comes_out(sky: EnvMap, tmp_path: Path) -> None:
+    halves, clamped = sky.half()
+    assert clamped == 0
+    source = EnvMap.from_array(halves.reshape(sky.level().shape), sky.projection)
+    ours = prefilter(source, phong(30), 8)
+    # Values of the source have 11 bits, and so has their mean.
+    np.testing.assert_allclose(ours.values, prefilter(sky, phong(30), 8).values, rtol=2**-11)
+    ours.save(tmp_path / "half.exr", format="half")
+    again = EnvMap.load(tmp_path / "half.exr", "cube")
+    np.testing.assert_allclose(again.values, ours.values, rtol=2**-11)
+
+
+def test_the_largest_half_float_stays_finite_in_every_lobe() -> None:
+    values = np.zeros((32, 64, 3), np.float32)
+    values[7, 11] = 65504
+    source = EnvMap.from_array(values, "latlong")
+    several = Prefilter(source)
+    for lobe in (phong(1), phong(1e6), ggx(0.01), ggx(0.0), ggx(1.0)):
+        made = several.apply(lobe, 16).values
+        assert np.isfinite(made).all()
+        assert made.min() >= 0
+        assert made.max() <= 65504 * (1 + 1e-6)

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from mirrorbake import _core
 from mirrorbake.envmap import EnvMap
 from mirrorbake.prefilter.convolve import Prefilter, phong
-from mirrorbake.projection import texel_directions, vectors
+from mirrorbake.projection import texel_directions
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -32,15 +32,7 @@ def sample_level(envmap: EnvMap, directions: ArrayLike, level: float) -> NDArray
     """
     if not np.isfinite(level):
         raise _core.InvalidArgument(f"level is {level}, expected a finite number")
-    d = vectors("directions", directions, 3)
-    at = float(np.clip(level, 0, envmap.levels - 1))
-    low = int(at)
-
-    def read(index: int) -> NDArray[np.float32]:
-        return EnvMap.from_array(envmap.level(index), envmap.projection, envmap.channels).sample(d)
-
-    below = read(low)
-    return below if at == low else (below + np.float32(at - low) * (read(low + 1) - below))
+    return envmap.sample(directions, filter="trilinear", level=level)
 
 
 def exponent_for_level(envmap: EnvMap, level: float, size: int = 16) -> tuple[float, float]:

@@ -1603,7 +1603,7 @@ def display_row_weights(matrix: RenderingMatrix, samples_per_pixel: int, target:
 class SolveOptions:
     """Weights of the regulariser and when to stop."""
 
-    def __init__(self, *, smoothness: float = 0.0010000000474974513, level_agreement: float = 0.0010000000474974513, prior_weight: float = 0.0010000000474974513, tolerance: float = 0.0010000000474974513, max_iterations: int = 200) -> None: ...
+    def __init__(self, *, smoothness: float = 0.0010000000474974513, level_agreement: float = 0.0010000000474974513, prior_weight: float = 0.0010000000474974513, tolerance: float = 0.0010000000474974513, max_iterations: int = 600) -> None: ...
 
     @property
     def smoothness(self) -> float:

@@ -64,13 +64,26 @@ class LeastSquares {
   SolveReport minimise(const std::vector<Vector>& target, float magnitude, const Bounds& bounds, Vector& x);
 
  private:
+  /// What conjugate gradients carry along.
+  struct Iterate {
+    std::vector<Vector> residual, step_rows;
+    Vector gx, step_gx, s, z, step, free;
+    ChannelSums gamma{};
+  };
+
+  /// Residual and G x at x, and the sums of squares with the regulariser.
+  ChannelSums evaluate(const std::vector<Vector>& target, float magnitude, const Vector& x, Iterate& it);
+  void step_once(float magnitude, Vector& x, Iterate& it);
+  ChannelSums project(const std::vector<Vector>& target, float magnitude, const Bounds& bounds,
+                      const Vector& before, const ChannelSums& squares, Vector& x, Iterate& it);
   void add_diagonal(std::size_t view);
   ChannelSums find_row_scale() const;
   /// y = scale · (G + magnitude) x.
   void regularise(const Vector& x, float magnitude, Vector& y);
-  /// s = AᵀW t − g, half the negative gradient; z = s / diagonal where free is 1, else 0. Returns s·z.
-  ChannelSums preconditioned_gradient(float magnitude, const Vector& free, const std::vector<Vector>& t,
-                                      const Vector& g, Vector& s, Vector& z);
+  /// s = AᵀW t − g, half the negative gradient.
+  void gradient(const std::vector<Vector>& t, const Vector& g, Vector& s);
+  /// z = s / diagonal where free is 1, else 0. Returns s·z.
+  ChannelSums precondition(float magnitude, const Vector& free, const Vector& s, Vector& z) const;
 
   const MapSolver::State& state_;
   std::vector<Vector> weights_;

@@ -242,7 +242,7 @@ class Infer(Section):
     footprint_scale: Annotated[float, Field(gt=0, le=4)] = 0.25
     """Size of a lookup's footprint in pixels: 1 filters as graphics hardware does for one sample per pixel,
     less is sharper for supersampled images."""
-    iterations: Annotated[int, Field(ge=0, le=100_000)] = 200
+    iterations: Annotated[int, Field(ge=0, le=100_000)] = 600
     """At most, per layer and view."""
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-3
     """The solver stops when its gradient has shrunk to this fraction."""

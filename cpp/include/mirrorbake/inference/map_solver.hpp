@@ -21,16 +21,19 @@ struct SolveOptions {
   float level_agreement = 1e-3F;  ///< λ of a texel's squared difference from the mean of its children, ≥ 0
   float prior_weight = 1e-3F;     ///< λ of the squared difference from the prior, where one is given, ≥ 0
   float tolerance = 1e-3F;   ///< stop when the preconditioned gradient has shrunk to this fraction, in (0, 1)
-  int max_iterations = 200;  ///< of all rounds together, 0…100000
+  int max_iterations = 600;  ///< of all rounds together, 0…100000
 };
 
 struct SolveReport {
-  int iterations = 0;            ///< of conjugate gradients, all rounds together
-  int rounds = 0;                ///< of the active set that keeps the map within its bounds
-  bool converged = false;        ///< the gradient met the tolerance, and no bound wanted to be held or freed
-  double relative_gradient = 0;  ///< what `tolerance` is compared with
-  std::size_t unknowns = 0;      ///< texels that some row sees; the others are filled in smoothly
-  double rms_error = 0;          ///< weighted root mean square of A x − b over rows and channels
+  int iterations = 0;      ///< of conjugate gradients, all rounds together
+  int rounds = 0;          ///< after each of them the map is put within its bounds
+  bool converged = false;  ///< the relative gradient met the tolerance
+  /// What `tolerance` is compared with: the preconditioned gradient within the bounds, a texel on a bound
+  /// counting only if it wants inside (the conditions of Karush, Kuhn and Tucker), relative to that of the prior
+  /// or a black map; the largest of the channels.
+  double relative_gradient = 0;
+  std::size_t unknowns = 0;           ///< texels that some row sees; the others are filled in smoothly
+  double rms_error = 0;               ///< weighted root mean square of A x − b over rows and channels
   std::array<double, 4> row_scale{};  ///< what the weights of SolveOptions were multiplied with, per channel
 };
 

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from benchmarks._build import built_program
 from benchmarks._report import Case, require, run, seconds
 from mirrorbake.envmap import EnvMap, Resampler
+from mirrorbake.literals import ResampleFilter, SampleFilter
 from mirrorbake.projection import directions_from_points, points_from_directions, texel_directions
 
 FloatArray = NDArray[np.float32]
@@ -203,12 +204,13 @@ def to_cubes(
     def error(cube: FloatArray) -> float:
         return relative_l2(cube[:, part], expected)
 
-    def ours(filter: str) -> Callable[[], EnvMap]:
+    def ours(filter: ResampleFilter) -> Callable[[], EnvMap]:
         return lambda: source.resample("cube", size, filter=filter)
 
     resampler = Resampler(source, "cube", size)
-    times = {f: 1e3 * seconds(ours(f), OUR_RUNS) for f in ("automatic", "bilinear")}
-    errors = {f: error(ours(f)().level()) for f in times}
+    filters: tuple[ResampleFilter, ...] = ("automatic", "bilinear")
+    times = {str(f): 1e3 * seconds(ours(f), OUR_RUNS) for f in filters}
+    errors = {str(f): error(ours(f)().level()) for f in filters}
     times["automatic, kept"] = 1e3 * seconds(lambda: resampler.apply(source), OUR_RUNS)
     errors["automatic, kept"] = error(resampler.apply(source).level())
     require(errors["automatic"] < limit, f"{name}: relative error {errors['automatic']:.2g}")
@@ -316,9 +318,10 @@ def to_paraboloids(
         return relative_l2(paraboloids[:, part], expected)
 
     time_peer, error_peer = 1e3 * seconds(peer, PEER_RUNS), error(peer())
-    for filter in ("automatic", "bilinear"):
+    filters: tuple[ResampleFilter, ...] = ("automatic", "bilinear")
+    for filter in filters:
 
-        def ours(filter: str = filter) -> EnvMap:
+        def ours(filter: ResampleFilter = filter) -> EnvMap:
             return cube.resample("dual_paraboloid", size, filter=filter)
 
         error_ours = error(ours().level())
@@ -384,9 +387,10 @@ def lookups() -> Iterator[Case]:
 
     expected = background(d)
     tiny = np.full_like(d, 1e-3)
-    for filter in ("bilinear", "ewa"):
+    filters: tuple[SampleFilter, ...] = ("bilinear", "ewa")
+    for filter in filters:
 
-        def ours(filter: str = filter) -> FloatArray:
+        def ours(filter: SampleFilter = filter) -> FloatArray:
             return cube.sample(d, tiny, tiny, filter=filter)
 
         errors = relative_l2(ours(), expected), relative_l2(peer(), expected)

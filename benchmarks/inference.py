@@ -26,13 +26,13 @@ def cases() -> Iterator[Case]:
         name="chrome",
         albedo=(0.0, 0.0, 0.0),
         specular=True,
-        fresnel=core.Fresnel(model=core.FresnelModel.schlick, r0=(0.9, 0.9, 0.9)),
+        fresnel=core.Fresnel(model="schlick", r0=(0.9, 0.9, 0.9)),
     )
     teapot = scene.add_object(
         "teapot", core.make_teapot(), scene.add_material(chrome), core.teapot_part_names()
     )
     camera = core.Camera((0.0, 0.25, 0.6), (0.0, 0.08, 0.0), vertical_fov_degrees=30.0, width=320, height=320)
-    tracer = core.Tracer(scene, core.TracerOptions(indirect=core.IndirectLight.none))
+    tracer = core.Tracer(scene, core.TracerOptions(indirect="none"))
     samples = tracer.trace_layers(camera, teapot, core.TraceOptions(samples_per_pixel=16)).samples
 
     layout = core.CubePyramidLayout(128)

@@ -45,7 +45,7 @@ def cases() -> Iterator[Case]:
     )
     meshes = [scene.object_mesh(index) for index in range(len(scene.object_names))]
     corners = np.concatenate([np.asarray(m.positions)[np.asarray(m.triangles)] for m in meshes])
-    tracer = core.Tracer(scene, core.TracerOptions(indirect=core.IndirectLight.none))
+    tracer = core.Tracer(scene, core.TracerOptions(indirect="none"))
     peer = EmbreeScene()
     TriangleMesh(peer, corners)
 

@@ -70,9 +70,7 @@ def our_scene(ball: core.TriangleMesh) -> core.Scene:
             "wall", core.make_rectangle(corner, u, v), scene.add_material(core.Material(albedo=albedo))
         )
     scene.add_rectangle_light(*LAMP, RADIANCE)
-    mirror = core.Material(
-        specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel(core.FresnelModel.constant, r0=MIRROR)
-    )
+    mirror = core.Material(specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel("constant", r0=MIRROR))
     scene.add_object("ball", ball, scene.add_material(mirror))
     return scene
 
@@ -156,7 +154,7 @@ def contest(
     name: str, scene: core.Scene, view: tuple[Point, Point], peer_scene: Callable[[Path], dict[str, Any]]
 ) -> Iterator[Case]:
     start = time.perf_counter()
-    tracer = core.Tracer(scene, core.TracerOptions(indirect=core.IndirectLight.path))
+    tracer = core.Tracer(scene, core.TracerOptions(indirect="path"))
     ready = time.perf_counter() - start
     camera = core.Camera(*view, vertical_fov_degrees=FOV, width=SIZE, height=SIZE)
 
@@ -211,9 +209,7 @@ def cases() -> Iterator[Case]:
 
 def scaling() -> Iterator[Case]:
     """One thread is the peer of two."""
-    tracer = core.Tracer(
-        our_scene(core.make_sphere((0, 1, 0), 0.7, 96)), core.TracerOptions(indirect=core.IndirectLight.path)
-    )
+    tracer = core.Tracer(our_scene(core.make_sphere((0, 1, 0), 0.7, 96)), core.TracerOptions(indirect="path"))
     camera = core.Camera(EYE, TARGET, vertical_fov_degrees=FOV, width=2 * SIZE, height=2 * SIZE)
     images, times = [], []
     for threads in (1, 2):
@@ -242,7 +238,7 @@ def triangles() -> Iterator[Case]:
         start = time.perf_counter()
         tracer = core.Tracer(
             our_scene(core.make_sphere((0, 1, 0), 0.7, segments)),
-            core.TracerOptions(indirect=core.IndirectLight.none),
+            core.TracerOptions(indirect="none"),
         )
         ready = time.perf_counter() - start
         memory = resident_megabytes() - before

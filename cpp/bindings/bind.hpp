@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <initializer_list>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -55,10 +56,64 @@ nb::ndarray<nb::numpy, const T> scalars_view(const std::vector<T>& values, nb::h
   return nb::ndarray<nb::numpy, const T>(values.data(), 1, shape, owner);
 }
 
+/// A str or os.PathLike, in UTF-8; names that are not come as they are in the file system.
+struct PathText {
+  std::string text;
+};
+
+/// Gives a class a repr that shows these attributes: Name(a=1, b='x').
+template <typename T, typename... Extra>
+void show(nb::class_<T, Extra...>& type, std::vector<const char*> attributes) {
+  type.def("__repr__", [attributes = std::move(attributes)](nb::handle self) {
+    std::string text = nb::cast<std::string>(self.type().attr("__name__")) + "(";
+    for (const char* attribute : attributes) {
+      if (attribute != attributes.front()) text += ", ";
+      text += std::string(attribute) + "=" + nb::cast<std::string>(nb::repr(self.attr(attribute)));
+    }
+    return nb::str((text + ")").c_str());
+  });
+}
+
+/// Gives a struct of plain values a repr, and lets it be pickled and copied: `attributes` are all that it
+/// has, each of which can be set, and its default value is a valid one.
+template <typename T, typename... Extra>
+void record(nb::class_<T, Extra...>& type, std::vector<const char*> attributes) {
+  show(type, attributes);
+  type.def("__getstate__",
+           [attributes](nb::handle self) {
+             nb::dict state;
+             for (const char* attribute : attributes) state[attribute] = self.attr(attribute);
+             return state;
+           })
+      .def("__setstate__", [](nb::handle self, const nb::dict& state) {
+        new (nb::inst_ptr<T>(self)) T();
+        nb::inst_mark_ready(self);
+        for (auto [attribute, value] : state) nb::setattr(self, attribute, value);
+      });
+}
+
 }  // namespace mirrorbake::bindings
 
 // A glm::vec2 or glm::vec3 is any sequence of two or three numbers in Python and comes back as a tuple.
 namespace nanobind::detail {
+
+template <>
+struct type_caster<mirrorbake::bindings::PathText> {
+  NB_TYPE_CASTER(mirrorbake::bindings::PathText, const_name("str | os.PathLike[str]"))
+
+  bool from_python(handle source, uint8_t, cleanup_list*) noexcept {
+    const object path = steal(PyOS_FSPath(source.ptr()));
+    const object bytes = path.is_valid() && PyUnicode_Check(path.ptr())
+                             ? steal(PyUnicode_AsEncodedString(path.ptr(), "utf-8", "surrogateescape"))
+                             : object();
+    if (!bytes.is_valid()) {
+      PyErr_Clear();
+      return false;
+    }
+    value.text.assign(PyBytes_AsString(bytes.ptr()), static_cast<std::size_t>(PyBytes_Size(bytes.ptr())));
+    return true;
+  }
+};
 
 template <>
 struct type_caster<glm::vec2> {

@@ -1,12 +1,15 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "bind.hpp"
+#include "bind_enums.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/compare.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
@@ -46,8 +49,11 @@ nb::ndarray<nb::numpy, float> block(std::vector<float>&& values) {
 }  // namespace
 
 void bind_envmap(nb::module_& m) {
-  nb::class_<EnvMapLayout>(
-      m, "EnvMapLayout", "Order of the values of an environment map: levels, faces, rows, columns, channels.")
+  nb::class_<EnvMapLayout> layout_type(
+      m, "EnvMapLayout",
+      "Order of the values of an environment map: levels, faces, rows, columns, channels.");
+  show(layout_type, {"projection", "width", "height", "levels", "channels"});
+  layout_type
       .def(
           "__init__",
           [](EnvMapLayout* self, const std::string& projection, int width, int height, int levels,
@@ -58,6 +64,20 @@ void bind_envmap(nb::module_& m) {
           },
           nb::arg("projection"), nb::arg("width"), nb::arg("height"), nb::arg("levels") = 1,
           nb::arg("channels") = 3)
+      .def(
+          "__eq__", [](const EnvMapLayout& a, const EnvMapLayout& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"))
+      .def("__getstate__",
+           [](const EnvMapLayout& l) {
+             return std::tuple(to_string(l.projection), l.width, l.height, l.levels, l.channels);
+           })
+      .def("__setstate__",
+           [](EnvMapLayout& self, const std::tuple<std::string, int, int, int, int>& state) {
+             const auto& [projection, width, height, levels, channels] = state;
+             const EnvMapLayout layout{parse_projection(projection), width, height, levels, channels};
+             validate(layout);
+             new (&self) EnvMapLayout(layout);
+           })
       .def_prop_ro(
           "projection", [](const EnvMapLayout& l) { return to_string(l.projection); },
           "Name of the projection.")
@@ -104,8 +124,8 @@ void bind_envmap(nb::module_& m) {
       .def(
           "__init__",
           [](Resampler* self, const EnvMapLayout& source, const std::string& projection, int width,
-             int height, const std::string& filter, Matrix3 source_from_target, std::size_t max_bytes) {
-            const ResampleOptions options{parse_resample_filter(filter), matrix(source_from_target)};
+             int height, ResampleFilter filter, Matrix3 source_from_target, std::size_t max_bytes) {
+            const ResampleOptions options{filter, matrix(source_from_target)};
             const Projection target = parse_projection(projection);
             nb::gil_scoped_release released;
             new (self) Resampler(source, target, width, height, options, max_bytes);
@@ -125,12 +145,11 @@ void bind_envmap(nb::module_& m) {
 
   m.def(
       "build_mips",
-      [](const EnvMapLayout& layout, FloatArray values, const std::string& filter) {
-        const MipFilter mip_filter = parse_mip_filter(filter);
+      [](const EnvMapLayout& layout, FloatArray values, MipFilter filter) {
         EnvMap result;
         {
           nb::gil_scoped_release released;
-          result = build_mips(view(layout, values), mip_filter);
+          result = build_mips(view(layout, values), filter);
         }
         return block(std::move(result.values));
       },
@@ -160,13 +179,13 @@ void bind_envmap(nb::module_& m) {
   m.def(
       "sample",
       [](const EnvMapLayout& layout, FloatArray values, PointArray directions, std::optional<PointArray> ddx,
-         std::optional<PointArray> ddy, const std::string& filter, std::optional<FloatArray> level,
-         double bias, double max_anisotropy) {
+         std::optional<PointArray> ddy, SampleFilter filter, std::optional<FloatArray> level, double bias,
+         double max_anisotropy) {
         const auto vectors = [](const PointArray& a) {
           return std::span(reinterpret_cast<const glm::vec3*>(a.data()), a.shape(0));
         };
         const std::span<const glm::vec3> none;
-        SampleOptions options{parse_sample_filter(filter), max_anisotropy, bias};
+        SampleOptions options{filter, max_anisotropy, bias};
         if (level) options.level = {level->data(), level->size()};
         std::vector<float> result(directions.shape(0) * static_cast<std::size_t>(layout.channels));
         {
@@ -182,7 +201,7 @@ void bind_envmap(nb::module_& m) {
         return to_numpy(std::move(result), {directions.shape(0), static_cast<std::size_t>(layout.channels)});
       },
       nb::arg("layout"), nb::arg("values"), nb::arg("directions"), nb::arg("ddx") = nb::none(),
-      nb::arg("ddy") = nb::none(), nb::arg("filter") = "bilinear", nb::arg("level") = nb::none(),
+      nb::arg("ddy") = nb::none(), nb::arg("filter") = SampleFilter::bilinear, nb::arg("level") = nb::none(),
       nb::arg("bias") = 0.0, nb::arg("max_anisotropy") = 16.0,
       "Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials\n"
       "(n, 3), or trilinear at levels, one or n of them.");
@@ -215,9 +234,6 @@ void bind_envmap(nb::module_& m) {
       "Direction and differentials of the reflection cone through a pixel's corners.");
   m.def("reflected_differential", &reflected_differential, nb::arg("direction"), nb::arg("normal"),
         nb::arg("dd"), nb::arg("dn"), "Differential of the mirror direction of a ray (Igehy 1999).");
-  nb::enum_<ConventionWay>(m, "ConventionWay", "Which of a map's two orientations is the given one.")
-      .value("from_foreign", ConventionWay::from_foreign, "the other program's")
-      .value("to_foreign", ConventionWay::to_foreign, "ours");
   m.def(
       "convert_convention",
       [](const EnvMapLayout& layout, FloatArray values, const std::string& name, ConventionWay way) {
@@ -227,35 +243,36 @@ void bind_envmap(nb::module_& m) {
       "The map in, or from, the orientation of openexr, oiio, mitsuba, threejs or ktx2.");
   m.def(
       "load_envmap",
-      [](const std::string& path, std::optional<std::string> projection, const std::string& faces) {
+      [](const PathText& path, std::optional<std::string> projection, FaceLayout faces) {
         std::optional<Projection> given;
         if (projection) given = parse_projection(*projection);
-        const FaceLayout face_layout = parse_face_layout(faces);
         EnvMap map;
         {
           nb::gil_scoped_release released;
-          map = load_envmap(path, given, face_layout);
+          map = load_envmap(path.text, given, faces);
         }
         return nb::make_tuple(map.layout, block(std::move(map.values)), map.channels);
       },
-      nb::arg("path"), nb::arg("projection") = nb::none(), nb::arg("faces") = "automatic",
-      nb::sig("def load_envmap(path: str, projection: str | None = None, faces: str = 'automatic') -> "
-              "tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]"),
+      nb::arg("path"), nb::arg("projection") = nb::none(), nb::arg("faces") = FaceLayout::automatic,
+      nb::sig("def load_envmap(path: str | os.PathLike[str], projection: str | None = None, "
+              "faces: typing.Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', "
+              "'files'] = 'automatic') -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]"),
       "Layout, values and names of the channels of a map in an image or KTX2 file.");
   m.def(
       "load_panorama",
-      [](const std::string& path, const std::string& layer, const std::string& part) {
+      [](const PathText& path, const std::string& layer, const std::string& part) {
         Image image;
         {
           nb::gil_scoped_release released;
-          image = load_panorama(path, {part, layer});
+          image = load_panorama(path.text, {part, layer});
         }
         const auto height = static_cast<std::size_t>(image.height);
         const auto width = static_cast<std::size_t>(image.width);
         return to_numpy(std::move(image.pixels), {height, width, 3});
       },
       nb::arg("path"), nb::arg("layer") = "", nb::arg("part") = "",
-      nb::sig("def load_panorama(path: str, layer: str = '', part: str = '') -> NDArray[numpy.float32]"),
+      nb::sig("def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') -> "
+              "NDArray[numpy.float32]"),
       "A map as light: a latlong of R, G and B, (height, width, 3). Cubes are recognised by their shape and "
       "resampled;\n"
       "alpha, depth and other channels are left out. `layer` and `part` choose in an EXR file. Raises "
@@ -264,21 +281,19 @@ void bind_envmap(nb::module_& m) {
       "a picture that is no panorama.");
   m.def(
       "save_envmap",
-      [](const std::string& path, const EnvMapLayout& layout, FloatArray values,
-         const std::vector<std::string>& channels, const std::string& faces, const std::string& format) {
-        const FaceLayout face_layout = parse_face_layout(faces);
-        const PixelFormat pixel_format = parse_pixel_format(format);
+      [](const PathText& path, const EnvMapLayout& layout, FloatArray values,
+         const std::vector<std::string>& channels, FaceLayout faces, PixelFormat format) {
         EnvMapView map = view(layout, values);
         map.channels = channels;
         nb::gil_scoped_release released;
-        return save_envmap(path, map, face_layout, pixel_format);
+        return save_envmap(path.text, map, faces, format);
       },
       nb::arg("path"), nb::arg("layout"), nb::arg("values"), nb::arg("channels"),
-      nb::arg("faces") = "automatic", nb::arg("format") = "automatic",
+      nb::arg("faces") = FaceLayout::automatic, nb::arg("format") = PixelFormat::automatic,
       "Write the finest level as an image, or all levels as KTX2.");
 
-  nb::class_<Comparison>(m, "Comparison", "How two maps differ, texels weighted by solid angle.")
-      .def_ro("max_error", &Comparison::max_error, "Largest difference.")
+  nb::class_<Comparison> comparison(m, "Comparison", "How two maps differ, texels weighted by solid angle.");
+  comparison.def_ro("max_error", &Comparison::max_error, "Largest difference.")
       .def_ro("mean_error", &Comparison::mean_error, "Mean difference over the sphere.")
       .def_ro("rms_error", &Comparison::rms_error, "Root of the mean squared difference.")
       .def_ro("relative_l2", &Comparison::relative_l2, "RMS error over the RMS of the reference.")
@@ -286,6 +301,8 @@ void bind_envmap(nb::module_& m) {
       .def_ro("flux_ratio", &Comparison::flux_ratio, "Flux of the map over that of the reference.")
       .def_ro("not_finite", &Comparison::not_finite,
               "Number of NaN and infinite values, left out of the rest.");
+  show(comparison,
+       {"max_error", "mean_error", "rms_error", "relative_l2", "psnr", "flux_ratio", "not_finite"});
   m.def(
       "compare_envmaps",
       [](const EnvMapLayout& layout, FloatArray values, const EnvMapLayout& reference_layout,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bind.hpp"
+#include "bind_enums.hpp"
 #include "mirrorbake/image/image_io.hpp"
 
 namespace mirrorbake::bindings {
@@ -24,33 +25,34 @@ void bind_image(nb::module_& m) {
 
   m.def(
       "load_image",
-      [](const std::string& path) {
+      [](const PathText& path) {
         Image image;
         {
           nb::gil_scoped_release released;
-          image = load_image(path);
+          image = load_image(path.text);
         }
         const std::size_t height = static_cast<std::size_t>(image.height);
         const std::size_t width = static_cast<std::size_t>(image.width);
         const std::size_t channels = image.channels.size();
         return nb::make_tuple(to_numpy(std::move(image.pixels), {height, width, channels}), image.channels);
       },
-      nb::arg("path"), nb::sig("def load_image(path: str) -> tuple[NDArray[numpy.float32], list[str]]"),
+      nb::arg("path"),
+      nb::sig("def load_image(path: str | os.PathLike[str]) -> tuple[NDArray[numpy.float32], list[str]]"),
       "Read an EXR, HDR, TIFF, PNG or JPEG as scene-linear float32 of shape (height, width, channels), with "
       "the\n"
       "names of the channels. Integer formats are decoded from sRGB. Raises FileError.");
 
   m.def(
       "save_image",
-      [](const std::string& path, FloatImage pixels, std::optional<std::vector<std::string>> channels,
-         const std::string& format) {
-        const PixelFormat pixel_format = parse_pixel_format(format);
+      [](const PathText& path, FloatImage pixels, std::optional<std::vector<std::string>> channels,
+         PixelFormat format) {
         if (!channels) channels = default_channels(static_cast<int>(pixels.shape(2)));
         nb::gil_scoped_release released;
-        return save_image(path, static_cast<int>(pixels.shape(1)), static_cast<int>(pixels.shape(0)),
-                          *channels, {pixels.data(), pixels.size()}, pixel_format);
+        return save_image(path.text, static_cast<int>(pixels.shape(1)), static_cast<int>(pixels.shape(0)),
+                          *channels, {pixels.data(), pixels.size()}, format);
       },
-      nb::arg("path"), nb::arg("pixels"), nb::arg("channels") = nb::none(), nb::arg("format") = "automatic",
+      nb::arg("path"), nb::arg("pixels"), nb::arg("channels") = nb::none(),
+      nb::arg("format") = PixelFormat::automatic,
       "Write scene-linear pixels of shape (height, width, channels) atomically; the extension of the path "
       "decides the\n"
       "format. `channels` names the channels (default Y, YA, RGB or RGBA). `format`: automatic, half, "

@@ -178,7 +178,8 @@ void bind_inference(nb::module_& m) {
       "Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2, float32 "
       "(rows, C).\n`pixel_samples` as SurfaceSamples has it stands in for samples_per_pixel.");
 
-  nb::class_<SolveOptions>(m, "SolveOptions", "Weights of the regulariser and when to stop.")
+  nb::class_<SolveOptions> solve_options(m, "SolveOptions", "Weights of the regulariser and when to stop.");
+  solve_options
       .def(
           "__init__",
           [](SolveOptions* self, float smoothness, float level_agreement, float prior_weight, float tolerance,
@@ -199,15 +200,17 @@ void bind_inference(nb::module_& m) {
       .def_rw("tolerance", &SolveOptions::tolerance,
               "Stop when the gradient has shrunk to this fraction, > 0.")
       .def_rw("max_iterations", &SolveOptions::max_iterations, "0 to 100000.");
+  record(solve_options, {"smoothness", "level_agreement", "prior_weight", "tolerance", "max_iterations"});
 
-  nb::class_<SolveReport>(m, "SolveReport", "What a solve did.")
-      .def_ro("iterations", &SolveReport::iterations)
+  nb::class_<SolveReport> solve_report(m, "SolveReport", "What a solve did.");
+  solve_report.def_ro("iterations", &SolveReport::iterations)
       .def_ro("rounds", &SolveReport::rounds, "Of the active set that keeps the map within its bounds.")
       .def_ro("converged", &SolveReport::converged,
               "The gradient met the tolerance, and the bounds are settled.")
       .def_ro("relative_gradient", &SolveReport::relative_gradient, "What `tolerance` is compared with.")
       .def_ro("unknowns", &SolveReport::unknowns, "Texels that some row sees.")
       .def_ro("rms_error", &SolveReport::rms_error, "Weighted root mean square of A x - b.");
+  show(solve_report, {"iterations", "rounds", "converged", "relative_gradient", "unknowns", "rms_error"});
 
   using Nodes = std::vector<std::pair<int, float>>;
   nb::class_<MapSolver>(m, "MapSolver",

@@ -6,29 +6,22 @@
 #include <utility>
 
 #include "bind.hpp"
-#include "mirrorbake/core/text.hpp"
+#include "bind_enums.hpp"
 #include "mirrorbake/scene/scene.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
 
 void bind_texture(nb::module_& m) {
-  nb::enum_<TextureWrap>(m, "TextureWrap", "How a coordinate outside [0,1] finds a texel.")
-      .value("repeat", TextureWrap::repeat, "tiled")
-      .value("clamp", TextureWrap::clamp, "the border's")
-      .value("mirror", TextureWrap::mirror, "tiled, every second tile mirrored");
-  nb::enum_<Transfer>(m, "Transfer", "Whether the values of an image file are decoded from sRGB.")
-      .value("automatic", Transfer::automatic, "integers are, unless the file says that it is linear")
-      .value("srgb", Transfer::srgb)
-      .value("linear", Transfer::linear);
   m.def("set_texture_cache_bytes", &set_texture_cache_bytes, nb::arg("bytes"),
         "Bound the cache of all texture files together; 1 GiB until it is set, at least 16 MiB.");
-  nb::class_<TextureReference>(
+  nb::class_<TextureReference> texture_reference(
       m, "TextureReference",
       "A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of\n"
       "KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation` "
       "radians\n"
-      "about (0, 0), then moved.")
+      "about (0, 0), then moved.");
+  texture_reference
       .def(
           "__init__",
           [](TextureReference* self, int texture, glm::vec2 offset, glm::vec2 scale, float rotation) {
@@ -46,20 +39,13 @@ void bind_texture(nb::module_& m) {
             return nb::isinstance<TextureReference>(other) &&
                    self == nb::cast<const TextureReference&>(other);
           },
-          nb::arg("other"))
-      .def("__repr__", [](const TextureReference& r) {
-        return "TextureReference(" + std::to_string(r.texture) + ", offset=" + text_of(r.offset) +
-               ", scale=" + text_of(r.scale) + ", rotation=" + text_of(r.rotation) + ")";
-      });
+          nb::arg("other"));
+  record(texture_reference, {"texture", "offset", "scale", "rotation"});
 }
 
 void bind_surface_material(nb::module_& m) {
-  nb::enum_<FresnelModel>(m, "FresnelModel", "How the reflectance of a mirror depends on the angle.")
-      .value("constant", FresnelModel::constant, "r0 at every angle")
-      .value("schlick", FresnelModel::schlick, "Schlick's approximation from r0")
-      .value("dielectric", FresnelModel::dielectric, "unpolarised, relative index eta")
-      .value("conductor", FresnelModel::conductor, "unpolarised, complex index eta + i k");
-  nb::class_<Fresnel>(m, "Fresnel", "Reflectance per colour channel as a function of the angle.")
+  nb::class_<Fresnel> fresnel(m, "Fresnel", "Reflectance per colour channel as a function of the angle.");
+  fresnel
       .def(
           "__init__",
           [](Fresnel* self, FresnelModel model, glm::vec3 r0, glm::vec3 eta, glm::vec3 k) {
@@ -72,15 +58,10 @@ void bind_surface_material(nb::module_& m) {
               "constant: reflectance; schlick: reflectance at normal incidence; in [0, 1]")
       .def_rw("eta", &Fresnel::eta, "dielectric, conductor: real part of the relative index, above 0")
       .def_rw("k", &Fresnel::k, "conductor: extinction coefficient, at least 0");
+  record(fresnel, {"model", "r0", "eta", "k"});
 
-  nb::enum_<LayerModel>(m, "LayerModel", "How diffuse light L_d and mirrored light L_m add up.")
-      .value("additive", LayerModel::additive, "F L_m + L_d")
-      .value("coated", LayerModel::coated, "F L_m + (1 − F) L_d");
-  nb::enum_<SpecularLobe>(m, "SpecularLobe", "Shape of the specular lobe about the mirror direction.")
-      .value("mirror", SpecularLobe::mirror, "a perfect mirror")
-      .value("ggx", SpecularLobe::ggx, "microfacets after Trowbridge and Reitz, of `roughness` α")
-      .value("phong", SpecularLobe::phong, "(r·l)^N, normalised, of `exponent` N");
-  nb::class_<Material>(m, "Material", "What a surface does with light.")
+  nb::class_<Material> material(m, "Material", "What a surface does with light.");
+  material
       .def(
           "__init__",
           [](Material* self, std::string name, glm::vec3 albedo, const TextureReference& albedo_texture,
@@ -144,6 +125,10 @@ void bind_surface_material(nb::module_& m) {
       .def_rw("normal_scale", &Material::normal_scale, "of the x and y of `normal_texture`")
       .def_rw("colors_tint_reflectance", &Material::colors_tint_reflectance,
               "the mesh's colours multiply `fresnel.r0`, too: of a metal");
+  record(material,
+         {"name", "albedo", "albedo_texture", "specular", "fresnel", "specular_texture", "lobe", "roughness",
+          "roughness_texture", "exponent", "layers", "emission", "emission_texture", "opacity",
+          "opacity_texture", "opacity_cutoff", "normal_texture", "normal_scale", "colors_tint_reflectance"});
 }
 
 }  // namespace

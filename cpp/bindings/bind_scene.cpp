@@ -1,6 +1,7 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <cstdint>
@@ -8,10 +9,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "bind.hpp"
+#include "bind_enums.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "mirrorbake/scene/load.hpp"
@@ -114,6 +117,29 @@ void bind_mesh(nb::module_& m) {
       .def_prop_ro(
           "colors", [](nb::handle self) { return vectors_view(mesh_of(self).colors, self); },
           "Colours of the vertices, (V, 3), linear, or (0, 3) if they have none.")
+      .def("__getstate__",
+           [](const TriangleMesh& mesh) {
+             return nb::make_tuple(
+                 vectors_to_numpy(std::vector(mesh.positions)), vectors_to_numpy(std::vector(mesh.triangles)),
+                 vectors_to_numpy(std::vector(mesh.normals)), vectors_to_numpy(std::vector(mesh.uvs)),
+                 to_numpy(std::vector(mesh.parts), {mesh.parts.size()}),
+                 vectors_to_numpy(std::vector(mesh.colors)));
+           })
+      .def(
+          "__setstate__",
+          [](TriangleMesh& self,
+             const std::tuple<PointArray, TriangleArray, PointArray, UvArray, PartArray, PointArray>& state) {
+            const auto& [positions, triangles, normals, uvs, parts, colors] = state;
+            TriangleMesh mesh;
+            mesh.positions = copied<glm::vec3>(positions);
+            mesh.triangles = copied<glm::uvec3>(triangles);
+            mesh.normals = copied<glm::vec3>(normals);
+            mesh.uvs = copied<glm::vec2>(uvs);
+            mesh.parts = copied<std::uint16_t>(parts);
+            mesh.colors = copied<glm::vec3>(colors);
+            validate(mesh);
+            new (&self) TriangleMesh(std::move(mesh));
+          })
       .def("__repr__", [](const TriangleMesh& mesh) {
         return "TriangleMesh(" + std::to_string(mesh.positions.size()) + " vertices, " +
                std::to_string(mesh.triangles.size()) + " triangles)";
@@ -149,7 +175,7 @@ void bind_shapes(nb::module_& m) {
   m.def("make_rectangle", &make_rectangle, nb::arg("corner"), nb::arg("u"), nb::arg("v"), Released(),
         "Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.");
   m.def(
-      "load_mesh", [](const std::string& path) { return load_mesh(path); }, nb::arg("path"), Released(),
+      "load_mesh", [](const PathText& path) { return load_mesh(path.text); }, nb::arg("path"), Released(),
       "Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied "
       "(instances\n"
       "become copies) and missing vertex normals made by angle-weighted averaging. Raises FileError if the "
@@ -186,14 +212,14 @@ void bind_loaded_scene(nb::module_& m) {
       .def_prop_ro("warnings", [](const LoadedScene& loaded) { return loaded.warnings; });
   m.def(
       "load_scene",
-      [](const std::string& path, int max_texture_side, std::uint64_t max_texture_bytes,
+      [](const PathText& path, int max_texture_side, std::uint64_t max_texture_bytes,
          std::uint64_t cache_textures_above, std::uint64_t max_vertices, std::uint64_t max_triangles,
          float luminous_efficacy) {
-        return load_scene(path, {{max_vertices, max_triangles},
-                                 max_texture_side,
-                                 max_texture_bytes,
-                                 cache_textures_above,
-                                 luminous_efficacy});
+        return load_scene(path.text, {{max_vertices, max_triangles},
+                                      max_texture_side,
+                                      max_texture_bytes,
+                                      cache_textures_above,
+                                      luminous_efficacy});
       },
       nb::arg("path"), nb::kw_only(), nb::arg("max_texture_side") = SceneOptions{}.max_texture_side,
       nb::arg("max_texture_bytes") = SceneOptions{}.max_texture_bytes,
@@ -208,12 +234,10 @@ void bind_loaded_scene(nb::module_& m) {
       "`luminous_efficacy` (lumens per watt). Raises FileError if a file is missing, corrupt, beyond a limit "
       "or\n"
       "refers to files outside its directory.");
-  nb::enum_<FileContent>(m, "FileContent", "Which of the two functions reads a file.")
-      .value("mesh", FileContent::mesh, "load_mesh")
-      .value("scene", FileContent::scene, "load_scene");
   m.def(
-      "referenced_files", &referenced_files, nb::arg("path"), nb::arg("content"),
-      nb::call_guard<nb::gil_scoped_release>(),
+      "referenced_files",
+      [](const PathText& path, FileContent content) { return referenced_files(path.text, content); },
+      nb::arg("path"), nb::arg("content"), nb::call_guard<nb::gil_scoped_release>(),
       "The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF file "
       "and,\n"
       "for a scene, its images, or the material libraries of an OBJ file and their images. Absolute, each "
@@ -242,14 +266,13 @@ void bind_scene(nb::module_& m) {
           "Add a texture of shape (height, width, 3), values in [0, 1], row 0 at the top.")
       .def(
           "add_texture_file",
-          [](Scene& scene, const std::string& path, TextureWrap wrap_u, TextureWrap wrap_v,
-             Transfer transfer) {
+          [](Scene& scene, const PathText& path, TextureWrap wrap_u, TextureWrap wrap_v, Transfer transfer) {
             Texture texture;
             texture.wrap_u = wrap_u;
             texture.wrap_v = wrap_v;
             {
               nb::gil_scoped_release released;
-              texture.file = std::make_shared<TextureFile>(path, transfer);
+              texture.file = std::make_shared<TextureFile>(path.text, transfer);
             }
             return append(scene.textures, std::move(texture));
           },

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bind.hpp"
+#include "bind_enums.hpp"
 #include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
 #include "mirrorbake/shading/fresnel_table.hpp"
@@ -76,12 +77,6 @@ ReflectanceFunction reflectance_of(FresnelModel model, double first, double k) {
     case FresnelModel::conductor: return [first, k](double c) { return fresnel_conductor(c, first, k); };
   }
   throw nb::value_error("model is not a FresnelModel");
-}
-
-Illuminant parse_illuminant(const std::string& name) {
-  if (name == "D65") return Illuminant::d65;
-  if (name == "E") return Illuminant::e;
-  throw nb::value_error(("illuminant is " + name + ", expected D65 or E").c_str());
 }
 
 using Triple = std::tuple<double, double, double>;
@@ -163,14 +158,13 @@ void bind_shading(nb::module_& m) {
       nb::arg("metal"), "float64 (n, 3): wavelength in nm, eta, k.");
   m.def(
       "metal_reflectance",
-      [](const std::string& metal, Values<double> c, const std::string& illuminant) {
+      [](const std::string& metal, Values<double> c, Illuminant illuminant) {
         const Metal parsed = parse_metal(metal);
-        const Illuminant light = parse_illuminant(illuminant);
         std::vector<double> rgb(3 * c.size());
         {
           nb::gil_scoped_release release;
           for (std::size_t i = 0; i < c.size(); ++i) {
-            const glm::dvec3 value = metal_reflectance(parsed, c.data()[i], light);
+            const glm::dvec3 value = metal_reflectance(parsed, c.data()[i], illuminant);
             for (int channel = 0; channel < 3; ++channel) rgb[3 * i + channel] = value[channel];
           }
         }
@@ -190,8 +184,8 @@ void bind_shading(nb::module_& m) {
       .def_prop_ro("index_error", [](const MetalFit& fit) { return triple(fit.conductor_error); });
   m.def(
       "fit_metal",
-      [](const std::string& metal, const std::string& illuminant) {
-        return fit_metal(parse_metal(metal), parse_illuminant(illuminant));
+      [](const std::string& metal, Illuminant illuminant) {
+        return fit_metal(parse_metal(metal), illuminant);
       },
       nb::arg("metal"), nb::arg("illuminant"));
 

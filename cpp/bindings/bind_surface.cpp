@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bind.hpp"
+#include "bind_enums.hpp"
 #include "mirrorbake/surface/run_time_model.hpp"
 #include "mirrorbake/surface/surface_samples.hpp"
 
@@ -97,20 +98,18 @@ void bind_run_time(nb::module_& m) {
       .def(
           "__init__",
           [](RunTimeModel* self, std::string name, std::vector<glm::vec2> places, float footprint_scale,
-             const std::string& filter, int max_taps) {
-            new (self) RunTimeModel(checked({std::move(name), std::move(places), footprint_scale,
-                                             parse_lookup_filter(filter), max_taps}));
+             LookupFilter filter, int max_taps) {
+            new (self) RunTimeModel(
+                checked({std::move(name), std::move(places), footprint_scale, filter, max_taps}));
           },
           nb::kw_only(), nb::arg("name"), nb::arg("places"), nb::arg("footprint_scale"),
-          nb::arg("filter") = "anisotropic", nb::arg("max_taps") = web.max_taps)
+          nb::arg("filter") = LookupFilter::anisotropic, nb::arg("max_taps") = web.max_taps)
       .def_ro("name", &RunTimeModel::name)
       .def_ro("places", &RunTimeModel::places,
               "Where in a pixel the lookups lie: (x, y) in [0, 1) from its top left corner.")
       .def_ro("footprint_scale", &RunTimeModel::footprint_scale,
               "Size of a lookup's footprint in pixels, in (0, 1024].")
-      .def_prop_ro(
-          "filter", [](const RunTimeModel& self) { return std::string(name_of(self.filter)); },
-          "nearest, bilinear, trilinear or anisotropic.")
+      .def_ro("filter", &RunTimeModel::filter)
       .def_ro("max_taps", &RunTimeModel::max_taps, "Of `anisotropic`: 1, or an even number up to 16.")
       .def(
           "__eq__", [](const RunTimeModel& a, const RunTimeModel& b) { return a == b; }, nb::is_operator(),

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bind.hpp"
+#include "bind_enums.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
@@ -56,15 +57,8 @@ void bind_tracer(nb::module_& m) {
                ", width=" + std::to_string(c.width) + ", height=" + std::to_string(c.height) + ")";
       });
 
-  nb::enum_<IndirectLight>(
-      m, "IndirectLight",
-      "How light that reaches a diffuse surface by way of other diffuse surfaces is found.")
-      .value("none", IndirectLight::none, "Not at all.")
-      .value("cached", IndirectLight::cached,
-             "Gathered once per vertex: noise-free, blurred over a triangle.")
-      .value("path", IndirectLight::path, "Random paths: unbiased, noisy.");
-
-  nb::class_<TracerOptions>(m, "TracerOptions", "What is decided once per scene.")
+  nb::class_<TracerOptions> tracer_options(m, "TracerOptions", "What is decided once per scene.");
+  tracer_options
       .def(
           "__init__",
           [](TracerOptions* self, IndirectLight indirect, int cache_rays, int cache_bounces,
@@ -79,8 +73,10 @@ void bind_tracer(nb::module_& m) {
               "Gather rays per vertex, 1 to 65536; a quarter after the first bounce.")
       .def_rw("cache_bounces", &TracerOptions::cache_bounces, "Diffuse bounces of the cache, 1 to 16.")
       .def_rw("seed", &TracerOptions::seed, "Of the cache.");
+  record(tracer_options, {"indirect", "cache_rays", "cache_bounces", "seed"});
 
-  nb::class_<TraceOptions>(m, "TraceOptions", "What is decided per image.")
+  nb::class_<TraceOptions> trace_options(m, "TraceOptions", "What is decided per image.");
+  trace_options
       .def(
           "__init__",
           [](TraceOptions* self, int samples_per_pixel, int max_specular_depth, int max_diffuse_depth,
@@ -120,6 +116,8 @@ void bind_tracer(nb::module_& m) {
             o.window = {w[0], w[1], w[2], w[3]};
           },
           "x, y, width, height of the part of the image to trace, in pixels; of no size: everything.");
+  record(trace_options, {"samples_per_pixel", "max_specular_depth", "max_diffuse_depth", "seed", "noise",
+                         "most_samples_per_pixel", "window"});
 
   nb::class_<BeautyTrace>(m, "BeautyTrace", "An image that was traced until its noise was below a limit.")
       .def_prop_ro(

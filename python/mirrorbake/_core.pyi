@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Sequence
 import enum
-from typing import Annotated, overload
+import os
+from typing import Annotated, Literal, overload
 
 import numpy
 import numpy.typing
@@ -304,40 +305,18 @@ class SaveReport:
 
     def __repr__(self) -> str: ...
 
-def load_image(path: str) -> tuple[NDArray[numpy.float32], list[str]]:
+def load_image(path: str | os.PathLike[str]) -> tuple[NDArray[numpy.float32], list[str]]:
     """
     Read an EXR, HDR, TIFF, PNG or JPEG as scene-linear float32 of shape (height, width, channels), with the
     names of the channels. Integer formats are decoded from sRGB. Raises FileError.
     """
 
-def save_image(path: str, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], channels: Sequence[str] | None = None, format: str = 'automatic') -> SaveReport:
+def save_image(path: str | os.PathLike[str], pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], channels: Sequence[str] | None = None, format: Literal['automatic', 'half', 'float32', 'uint8', 'uint16'] = 'automatic') -> SaveReport:
     """
     Write scene-linear pixels of shape (height, width, channels) atomically; the extension of the path decides the
     format. `channels` names the channels (default Y, YA, RGB or RGBA). `format`: automatic, half, float32, uint8
     or uint16. Raises FileError and InvalidArgument.
     """
-
-class TextureWrap(enum.Enum):
-    """How a coordinate outside [0,1] finds a texel."""
-
-    repeat = 0
-    """tiled"""
-
-    clamp = 1
-    """the border's"""
-
-    mirror = 2
-    """tiled, every second tile mirrored"""
-
-class Transfer(enum.Enum):
-    """Whether the values of an image file are decoded from sRGB."""
-
-    automatic = 0
-    """integers are, unless the file says that it is linear"""
-
-    srgb = 1
-
-    linear = 2
 
 def set_texture_cache_bytes(bytes: int) -> None:
     """
@@ -381,31 +360,20 @@ class TextureReference:
 
     def __repr__(self) -> str: ...
 
-class FresnelModel(enum.Enum):
-    """How the reflectance of a mirror depends on the angle."""
+    def __getstate__(self) -> dict: ...
 
-    constant = 0
-    """r0 at every angle"""
-
-    schlick = 1
-    """Schlick's approximation from r0"""
-
-    dielectric = 2
-    """unpolarised, relative index eta"""
-
-    conductor = 3
-    """unpolarised, complex index eta + i k"""
+    def __setstate__(self, arg: dict, /) -> None: ...
 
 class Fresnel:
     """Reflectance per colour channel as a function of the angle."""
 
-    def __init__(self, model: FresnelModel = FresnelModel.constant, r0: Sequence[float] = (0.0, 0.0, 0.0), eta: Sequence[float] = (1.5, 1.5, 1.5), k: Sequence[float] = (0.0, 0.0, 0.0)) -> None: ...
+    def __init__(self, model: Literal['constant', 'schlick', 'dielectric', 'conductor'] = 'constant', r0: Sequence[float] = (0.0, 0.0, 0.0), eta: Sequence[float] = (1.5, 1.5, 1.5), k: Sequence[float] = (0.0, 0.0, 0.0)) -> None: ...
 
     @property
-    def model(self) -> FresnelModel: ...
+    def model(self) -> Literal['constant', 'schlick', 'dielectric', 'conductor']: ...
 
     @model.setter
-    def model(self, arg: FresnelModel, /) -> None: ...
+    def model(self, arg: Literal['constant', 'schlick', 'dielectric', 'conductor'], /) -> None: ...
 
     @property
     def r0(self) -> Sequence[float]:
@@ -430,31 +398,16 @@ class Fresnel:
     @k.setter
     def k(self, arg: Sequence[float], /) -> None: ...
 
-class LayerModel(enum.Enum):
-    """How diffuse light L_d and mirrored light L_m add up."""
+    def __repr__(self) -> str: ...
 
-    additive = 0
-    """F L_m + L_d"""
+    def __getstate__(self) -> dict: ...
 
-    coated = 1
-    """F L_m + (1 − F) L_d"""
-
-class SpecularLobe(enum.Enum):
-    """Shape of the specular lobe about the mirror direction."""
-
-    mirror = 0
-    """a perfect mirror"""
-
-    ggx = 1
-    """microfacets after Trowbridge and Reitz, of `roughness` α"""
-
-    phong = 2
-    """(r·l)^N, normalised, of `exponent` N"""
+    def __setstate__(self, arg: dict, /) -> None: ...
 
 class Material:
     """What a surface does with light."""
 
-    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: TextureReference = ..., specular: bool = False, fresnel: Fresnel = ..., specular_texture: TextureReference = ..., lobe: SpecularLobe = SpecularLobe.mirror, roughness: float = 0.10000000149011612, roughness_texture: TextureReference = ..., exponent: float = 100.0, layers: LayerModel = LayerModel.additive, emission: Sequence[float] = (0.0, 0.0, 0.0), emission_texture: TextureReference = ..., opacity: float = 1.0, opacity_texture: TextureReference = ..., opacity_cutoff: float | None = None, normal_texture: TextureReference = ..., normal_scale: float = 1.0, colors_tint_reflectance: bool = False) -> None: ...
+    def __init__(self, *, name: str = '', albedo: Sequence[float] = (0.5, 0.5, 0.5), albedo_texture: TextureReference = ..., specular: bool = False, fresnel: Fresnel = ..., specular_texture: TextureReference = ..., lobe: Literal['mirror', 'ggx', 'phong'] = 'mirror', roughness: float = 0.10000000149011612, roughness_texture: TextureReference = ..., exponent: float = 100.0, layers: Literal['additive', 'coated'] = 'additive', emission: Sequence[float] = (0.0, 0.0, 0.0), emission_texture: TextureReference = ..., opacity: float = 1.0, opacity_texture: TextureReference = ..., opacity_cutoff: float | None = None, normal_texture: TextureReference = ..., normal_scale: float = 1.0, colors_tint_reflectance: bool = False) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -497,10 +450,10 @@ class Material:
     def specular_texture(self, arg: TextureReference, /) -> None: ...
 
     @property
-    def lobe(self) -> SpecularLobe: ...
+    def lobe(self) -> Literal['mirror', 'ggx', 'phong']: ...
 
     @lobe.setter
-    def lobe(self, arg: SpecularLobe, /) -> None: ...
+    def lobe(self, arg: Literal['mirror', 'ggx', 'phong'], /) -> None: ...
 
     @property
     def roughness(self) -> float:
@@ -524,10 +477,10 @@ class Material:
     def exponent(self, arg: float, /) -> None: ...
 
     @property
-    def layers(self) -> LayerModel: ...
+    def layers(self) -> Literal['additive', 'coated']: ...
 
     @layers.setter
-    def layers(self, arg: LayerModel, /) -> None: ...
+    def layers(self, arg: Literal['additive', 'coated'], /) -> None: ...
 
     @property
     def emission(self) -> Sequence[float]:
@@ -591,6 +544,12 @@ class Material:
     @colors_tint_reflectance.setter
     def colors_tint_reflectance(self, arg: bool, /) -> None: ...
 
+    def __repr__(self) -> str: ...
+
+    def __getstate__(self) -> dict: ...
+
+    def __setstate__(self, arg: dict, /) -> None: ...
+
 class TriangleMesh:
     """
     Triangles with optional vertex normals, texture coordinates and parts. World space, metres.
@@ -628,6 +587,10 @@ class TriangleMesh:
     def colors(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
         """Colours of the vertices, (V, 3), linear, or (0, 3) if they have none."""
 
+    def __getstate__(self) -> tuple: ...
+
+    def __setstate__(self, arg: tuple[Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]], /) -> None: ...
+
     def __repr__(self) -> str: ...
 
 def bounds(mesh: TriangleMesh) -> tuple[Sequence[float], Sequence[float]]:
@@ -664,7 +627,7 @@ def make_rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[floa
     Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.
     """
 
-def load_mesh(path: str) -> TriangleMesh:
+def load_mesh(path: str | os.PathLike[str]) -> TriangleMesh:
     """
     Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied (instances
     become copies) and missing vertex normals made by angle-weighted averaging. Raises FileError if the file is
@@ -695,12 +658,12 @@ class Scene:
 
     def __init__(self) -> None: ...
 
-    def add_texture(self, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], wrap_u: TextureWrap = TextureWrap.repeat, wrap_v: TextureWrap = TextureWrap.repeat) -> int:
+    def add_texture(self, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], wrap_u: Literal['repeat', 'clamp', 'mirror'] = 'repeat', wrap_v: Literal['repeat', 'clamp', 'mirror'] = 'repeat') -> int:
         """
         Add a texture of shape (height, width, 3), values in [0, 1], row 0 at the top.
         """
 
-    def add_texture_file(self, path: str, wrap_u: TextureWrap = TextureWrap.repeat, wrap_v: TextureWrap = TextureWrap.repeat, transfer: Transfer = Transfer.automatic) -> int:
+    def add_texture_file(self, path: str | os.PathLike[str], wrap_u: Literal['repeat', 'clamp', 'mirror'] = 'repeat', wrap_v: Literal['repeat', 'clamp', 'mirror'] = 'repeat', transfer: Literal['automatic', 'srgb', 'linear'] = 'automatic') -> int:
         """
         Add a texture whose texels are read from an image file when they are needed, and kept in a cache
         of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].
@@ -712,7 +675,7 @@ class Scene:
         for all three; scene-linear, row 0 at the top. Raises FileError if its file has changed.
         """
 
-    def texture_wrap(self, texture: int) -> tuple[TextureWrap, TextureWrap]:
+    def texture_wrap(self, texture: int) -> tuple[Literal['repeat', 'clamp', 'mirror'], Literal['repeat', 'clamp', 'mirror']]:
         """How coordinates outside [0,1] find texels, along u and v."""
 
     def add_material(self, material: Material) -> int:
@@ -838,7 +801,7 @@ class LoadedScene:
     @property
     def warnings(self) -> list[SceneWarning]: ...
 
-def load_scene(path: str, *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, cache_textures_above: int = 67108864, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0) -> LoadedScene:
+def load_scene(path: str | os.PathLike[str], *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, cache_textures_above: int = 67108864, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0) -> LoadedScene:
     """
     Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,
     materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in memory
@@ -847,16 +810,7 @@ def load_scene(path: str, *, max_texture_side: int = 16384, max_texture_bytes: i
     refers to files outside its directory.
     """
 
-class FileContent(enum.Enum):
-    """Which of the two functions reads a file."""
-
-    mesh = 0
-    """load_mesh"""
-
-    scene = 1
-    """load_scene"""
-
-def referenced_files(path: str, content: FileContent) -> list[str]:
+def referenced_files(path: str | os.PathLike[str], content: Literal['mesh', 'scene']) -> list[str]:
     """
     The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF file and,
     for a scene, its images, or the material libraries of an OBJ file and their images. Absolute, each once,
@@ -977,7 +931,7 @@ class RunTimeModel:
     How the renderer that will draw the maps reads them: what a map is inferred for.
     """
 
-    def __init__(self, *, name: str, places: Sequence[Sequence[float]], footprint_scale: float, filter: str = 'anisotropic', max_taps: int = 4) -> None: ...
+    def __init__(self, *, name: str, places: Sequence[Sequence[float]], footprint_scale: float, filter: Literal['nearest', 'bilinear', 'trilinear', 'anisotropic'] = 'anisotropic', max_taps: int = 4) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -993,8 +947,7 @@ class RunTimeModel:
         """Size of a lookup's footprint in pixels, in (0, 1024]."""
 
     @property
-    def filter(self) -> str:
-        """nearest, bilinear, trilinear or anisotropic."""
+    def filter(self) -> Literal['nearest', 'bilinear', 'trilinear', 'anisotropic']: ...
 
     @property
     def max_taps(self) -> int:
@@ -1056,30 +1009,16 @@ class Camera:
 
     def __repr__(self) -> str: ...
 
-class IndirectLight(enum.Enum):
-    """
-    How light that reaches a diffuse surface by way of other diffuse surfaces is found.
-    """
-
-    none = 0
-    """Not at all."""
-
-    cached = 1
-    """Gathered once per vertex: noise-free, blurred over a triangle."""
-
-    path = 2
-    """Random paths: unbiased, noisy."""
-
 class TracerOptions:
     """What is decided once per scene."""
 
-    def __init__(self, *, indirect: IndirectLight = IndirectLight.cached, cache_rays: int = 64, cache_bounces: int = 3, seed: int = 0) -> None: ...
+    def __init__(self, *, indirect: Literal['none', 'cached', 'path'] = 'cached', cache_rays: int = 64, cache_bounces: int = 3, seed: int = 0) -> None: ...
 
     @property
-    def indirect(self) -> IndirectLight: ...
+    def indirect(self) -> Literal['none', 'cached', 'path']: ...
 
     @indirect.setter
-    def indirect(self, arg: IndirectLight, /) -> None: ...
+    def indirect(self, arg: Literal['none', 'cached', 'path'], /) -> None: ...
 
     @property
     def cache_rays(self) -> int:
@@ -1101,6 +1040,12 @@ class TracerOptions:
 
     @seed.setter
     def seed(self, arg: int, /) -> None: ...
+
+    def __repr__(self) -> str: ...
+
+    def __getstate__(self) -> dict: ...
+
+    def __setstate__(self, arg: dict, /) -> None: ...
 
 class TraceOptions:
     """What is decided per image."""
@@ -1159,6 +1104,12 @@ class TraceOptions:
 
     @window.setter
     def window(self, arg: Sequence[int], /) -> None: ...
+
+    def __repr__(self) -> str: ...
+
+    def __getstate__(self) -> dict: ...
+
+    def __setstate__(self, arg: dict, /) -> None: ...
 
 class BeautyTrace:
     """An image that was traced until its noise was below a limit."""
@@ -1311,6 +1262,14 @@ class EnvMapLayout:
 
     def __init__(self, projection: str, width: int, height: int, levels: int = 1, channels: int = 3) -> None: ...
 
+    def __repr__(self) -> str: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __getstate__(self) -> tuple[str, int, int, int, int]: ...
+
+    def __setstate__(self, arg: tuple[str, int, int, int, int], /) -> None: ...
+
     @property
     def projection(self) -> str:
         """Name of the projection."""
@@ -1362,7 +1321,7 @@ def half_from_float(layout: EnvMapLayout, values: NDArray[numpy.float32]) -> tup
 class Resampler:
     """Resamples maps of one layout, and keeps what every texel is made from."""
 
-    def __init__(self, source: EnvMapLayout, projection: str, width: int, height: int, filter: str, source_from_target: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)], max_bytes: int) -> None: ...
+    def __init__(self, source: EnvMapLayout, projection: str, width: int, height: int, filter: Literal['automatic', 'area', 'bilinear', 'nearest'], source_from_target: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)], max_bytes: int) -> None: ...
 
     def apply(self, layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], result: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None:
         """
@@ -1376,7 +1335,7 @@ class Resampler:
     def bytes(self) -> int:
         """Memory of what is kept."""
 
-def build_mips(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], filter: str) -> NDArray[numpy.float32]:
+def build_mips(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], filter: Literal['box', 'solid_angle', 'seamless']) -> NDArray[numpy.float32]:
     """All levels from the finest: box, solid_angle or seamless."""
 
 def measure_seam(layout: EnvMapLayout, values: NDArray[numpy.float32], level: int) -> tuple[float, float]:
@@ -1389,7 +1348,7 @@ def add_border(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], d
     Faces of a level with a border of their neighbours' texels: (faces, height, width, channels).
     """
 
-def sample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], ddx: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, ddy: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, filter: str = 'bilinear', level: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)] | None = None, bias: float = 0.0, max_anisotropy: float = 16.0) -> NDArray[numpy.float32]:
+def sample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], ddx: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, ddy: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, filter: Literal['nearest', 'bilinear', 'trilinear', 'ewa'] = 'bilinear', level: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)] | None = None, bias: float = 0.0, max_anisotropy: float = 16.0) -> NDArray[numpy.float32]:
     """
     Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials
     (n, 3), or trilinear at levels, one or n of them.
@@ -1409,33 +1368,24 @@ def footprint_from_corners(top_left: Sequence[float], top_right: Sequence[float]
 def reflected_differential(direction: Sequence[float], normal: Sequence[float], dd: Sequence[float], dn: Sequence[float]) -> Sequence[float]:
     """Differential of the mirror direction of a ray (Igehy 1999)."""
 
-class ConventionWay(enum.Enum):
-    """Which of a map's two orientations is the given one."""
-
-    from_foreign = 0
-    """the other program's"""
-
-    to_foreign = 1
-    """ours"""
-
-def convert_convention(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], name: str, way: ConventionWay) -> NDArray[numpy.float32]:
+def convert_convention(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], name: str, way: Literal['from_foreign', 'to_foreign']) -> NDArray[numpy.float32]:
     """
     The map in, or from, the orientation of openexr, oiio, mitsuba, threejs or ktx2.
     """
 
-def load_envmap(path: str, projection: str | None = None, faces: str = 'automatic') -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]:
+def load_envmap(path: str | os.PathLike[str], projection: str | None = None, faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic') -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]:
     """
     Layout, values and names of the channels of a map in an image or KTX2 file.
     """
 
-def load_panorama(path: str, layer: str = '', part: str = '') -> NDArray[numpy.float32]:
+def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') -> NDArray[numpy.float32]:
     """
     A map as light: a latlong of R, G and B, (height, width, 3). Cubes are recognised by their shape and resampled;
     alpha, depth and other channels are left out. `layer` and `part` choose in an EXR file. Raises FileError for
     a picture that is no panorama.
     """
 
-def save_envmap(path: str, layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], channels: Sequence[str], faces: str = 'automatic', format: str = 'automatic') -> SaveReport:
+def save_envmap(path: str | os.PathLike[str], layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], channels: Sequence[str], faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic', format: Literal['automatic', 'half', 'float32', 'uint8', 'uint16'] = 'automatic') -> SaveReport:
     """Write the finest level as an image, or all levels as KTX2."""
 
 class Comparison:
@@ -1468,6 +1418,8 @@ class Comparison:
     @property
     def not_finite(self) -> int:
         """Number of NaN and infinite values, left out of the rest."""
+
+    def __repr__(self) -> str: ...
 
 def compare_envmaps(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], reference_layout: EnvMapLayout, reference: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> Comparison:
     """The finest level of a map against a reference."""
@@ -1642,6 +1594,12 @@ class SolveOptions:
     @max_iterations.setter
     def max_iterations(self, arg: int, /) -> None: ...
 
+    def __repr__(self) -> str: ...
+
+    def __getstate__(self) -> dict: ...
+
+    def __setstate__(self, arg: dict, /) -> None: ...
+
 class SolveReport:
     """What a solve did."""
 
@@ -1667,6 +1625,8 @@ class SolveReport:
     @property
     def rms_error(self) -> float:
         """Weighted root mean square of A x - b."""
+
+    def __repr__(self) -> str: ...
 
 class MapSolver:
     """
@@ -1915,12 +1875,12 @@ class FresnelTable:
     def evaluate(self, c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], f: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
         """Fills `f` with interpolated reflectance."""
 
-def make_fresnel_table(model: FresnelModel, first: float, k: float, size: int) -> FresnelTable:
+def make_fresnel_table(model: Literal['constant', 'schlick', 'dielectric', 'conductor'], first: float, k: float, size: int) -> FresnelTable:
     """
     first: r0, relative index or eta, as the model has it; k for conductors.
     """
 
-def fresnel_table_for_error(model: FresnelModel, first: float, k: float, max_error: float) -> FresnelTable: ...
+def fresnel_table_for_error(model: Literal['constant', 'schlick', 'dielectric', 'conductor'], first: float, k: float, max_error: float) -> FresnelTable: ...
 
 def metal_names() -> list[str]:
     """Names of the metals with measured optical constants."""
@@ -1931,7 +1891,7 @@ def metal_source(metal: str) -> str:
 def metal_optical_constants(metal: str) -> NDArray[numpy.float64]:
     """float64 (n, 3): wavelength in nm, eta, k."""
 
-def metal_reflectance(metal: str, c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], illuminant: str) -> NDArray[numpy.float64]:
+def metal_reflectance(metal: str, c: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], illuminant: Literal['D65', 'E']) -> NDArray[numpy.float64]:
     """float64 (c.size, 3): linear Rec.709."""
 
 class MetalFit:
@@ -1957,7 +1917,7 @@ class MetalFit:
     @property
     def index_error(self) -> tuple[float, float, float]: ...
 
-def fit_metal(metal: str, illuminant: str) -> MetalFit: ...
+def fit_metal(metal: str, illuminant: Literal['D65', 'E']) -> MetalFit: ...
 
 def active_isa() -> str:
     """Instruction set in use: 'baseline', 'sse42', 'avx2' or 'avx512'."""

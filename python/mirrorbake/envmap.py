@@ -13,9 +13,11 @@ Examples
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass
 from os import fspath
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,14 +29,23 @@ from mirrorbake.resample import Resampler, make_resampler, resampled
 if TYPE_CHECKING:
     from os import PathLike
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+    from mirrorbake.literals import (
+        ConventionWay,
+        FaceLayout,
+        MipFilter,
+        PixelFormat,
+        ResampleFilter,
+        SampleFilter,
+    )
 
 __all__ = ["EnvMap", "Resampler"]
 
 _NAMES = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EnvMap:
     """An environment map in one block of float32 values: levels, faces, rows, columns, channels.
 
@@ -58,6 +69,29 @@ class EnvMap:
             raise ValueError(f"values has {self.values.size} numbers, expected {self.layout.size}")
         if len(self.channels) != self.layout.channels:
             raise ValueError(f"channels has {len(self.channels)} names, expected {self.layout.channels}")
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """Give NumPy the finest level, as `level` does."""
+        level = self.level()
+        if copy is False and dtype is not None and np.dtype(dtype) != level.dtype:
+            raise ValueError(f"cannot see float32 values as {np.dtype(dtype)} without a copy")
+        return np.array(level, dtype) if copy else np.asarray(level, dtype)
+
+    def __repr__(self) -> str:
+        """Tell the projection, size, levels and channels, not the values."""
+        size = f"{self.layout.width}x{self.layout.height}"
+        faces = f"{self.layout.faces} faces of " if self.layout.faces > 1 else ""
+        return f"EnvMap({self.projection}, {faces}{size}, levels={self.levels}, channels={self.channels})"
+
+    def _repr_png_(self) -> bytes:
+        """Show the finest level in a notebook: faces side by side, clipped to [0, 1], as sRGB."""
+        level = self.level()
+        picture = np.concatenate(list(level), axis=1) if self.layout.faces > 1 else level
+        shown = picture[..., :3] if picture.shape[-1] >= 3 else picture[..., :1]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "map.png"
+            _core.save_image(path, np.ascontiguousarray(np.clip(np.nan_to_num(shown), 0, 1)))
+            return path.read_bytes()
 
     @classmethod
     def from_array(cls, array: ArrayLike, projection: str, channels: list[str] | None = None) -> EnvMap:
@@ -92,7 +126,7 @@ class EnvMap:
 
     @classmethod
     def load(
-        cls, path: str | PathLike[str], projection: str | None = None, *, faces: str = "automatic"
+        cls, path: str | PathLike[str], projection: str | None = None, *, faces: FaceLayout = "automatic"
     ) -> EnvMap:
         """Read an EXR, HDR, TIFF, PNG, JPEG or KTX2.
 
@@ -114,7 +148,7 @@ class EnvMap:
         return cls(layout, values, names)
 
     def save(
-        self, path: str | PathLike[str], *, faces: str = "automatic", format: str = "automatic"
+        self, path: str | PathLike[str], *, faces: FaceLayout = "automatic", format: PixelFormat = "automatic"
     ) -> _core.SaveReport:
         """Write the finest level as an image, or all levels as KTX2, atomically.
 
@@ -171,7 +205,7 @@ class EnvMap:
         projection: str,
         size: int | tuple[int, int],
         *,
-        filter: str = "automatic",
+        filter: ResampleFilter = "automatic",
         source_from_target: ArrayLike | None = None,
     ) -> EnvMap:
         """Return the finest level in another projection and size.
@@ -197,7 +231,7 @@ class EnvMap:
         resampler = make_resampler(self.layout, projection, size, filter, source_from_target, 0)
         return resampled(resampler, self)
 
-    def mips(self, filter: str = "seamless") -> EnvMap:
+    def mips(self, filter: MipFilter = "seamless") -> EnvMap:
         """All levels down to 1×1, by ``box``, ``solid_angle`` or ``seamless``; else InvalidArgument."""
         values = _core.build_mips(self.layout, self.values, filter)
         width, height = self.layout.width, self.layout.height
@@ -225,7 +259,7 @@ class EnvMap:
         ddx: ArrayLike | None = None,
         ddy: ArrayLike | None = None,
         *,
-        filter: str = "bilinear",
+        filter: SampleFilter = "bilinear",
         level: ArrayLike | None = None,
         bias: float = 0.0,
         max_anisotropy: float = 16.0,
@@ -295,13 +329,13 @@ class EnvMap:
 
     def to_convention(self, name: str) -> EnvMap:
         """Return the map as openexr, oiio, mitsuba, threejs or ktx2 orient it. One level only."""
-        return self._converted(name, _core.ConventionWay.to_foreign)
+        return self._converted(name, "to_foreign")
 
     def from_convention(self, name: str) -> EnvMap:
         """Return our map of one that openexr, oiio, mitsuba, threejs or ktx2 orient. One level only."""
-        return self._converted(name, _core.ConventionWay.from_foreign)
+        return self._converted(name, "from_foreign")
 
-    def _converted(self, name: str, way: _core.ConventionWay) -> EnvMap:
+    def _converted(self, name: str, way: ConventionWay) -> EnvMap:
         values = _core.convert_convention(self.layout, self.values, name, way)
         return EnvMap(self.layout, values, self.channels)
 

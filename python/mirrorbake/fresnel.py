@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from mirrorbake import _core
 from mirrorbake.arrays import real_array
+from mirrorbake.literals import FresnelModel, Illuminant
 
 __all__ = [
     "Conductor",
@@ -218,14 +219,14 @@ class FresnelTable:
         return _apply(self._table.evaluate, out, c)
 
 
-def _table_arguments(model: Model) -> tuple[_core.FresnelModel, float, float]:
+def _table_arguments(model: Model) -> tuple[FresnelModel, float, float]:
     match model:
         case Schlick(r0):
-            return _core.FresnelModel.schlick, r0, 0.0
+            return "schlick", r0, 0.0
         case Dielectric(ior):
-            return _core.FresnelModel.dielectric, ior, 0.0
+            return "dielectric", ior, 0.0
         case Conductor(eta, k):
-            return _core.FresnelModel.conductor, eta, k
+            return "conductor", eta, k
 
 
 def make_table(model: Model, size: int) -> FresnelTable:
@@ -256,7 +257,7 @@ def metal_names() -> list[str]:
     return _core.metal_names()
 
 
-def metal_reflectance(metal: str, c: ArrayLike, illuminant: str = "D65") -> npt.NDArray[np.float64]:
+def metal_reflectance(metal: str, c: ArrayLike, illuminant: Illuminant = "D65") -> npt.NDArray[np.float64]:
     """Reflectance of a metal as linear Rec.709, from its measured spectrum.
 
     Parameters
@@ -287,7 +288,7 @@ class MetalColour:
     """A metal as renderers want it, per channel of linear Rec.709, with largest errors over all angles."""
 
     metal: str
-    illuminant: str
+    illuminant: Illuminant
     source: str
     normal: tuple[float, float, float]  # reflectance at normal incidence, not clamped
     r0: tuple[float, float, float]  # of the Schlick curve closest over all angles (least squares)
@@ -297,7 +298,7 @@ class MetalColour:
     index_error: tuple[float, float, float]
 
 
-def metal_colour(metal: str, illuminant: str = "D65") -> MetalColour:
+def metal_colour(metal: str, illuminant: Illuminant = "D65") -> MetalColour:
     """Fit three-channel models to :func:`metal_reflectance`."""
     fit = _core.fit_metal(metal, illuminant)
     red, green, blue = metal_reflectance(metal, 1.0, illuminant).tolist()

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from mirrorbake.envmap import EnvMap
+    from mirrorbake.literals import ResampleFilter
 
 __all__ = ["Resampler"]
 
@@ -53,7 +54,7 @@ class Resampler:
         projection: str,
         size: int | tuple[int, int],
         *,
-        filter: str = "automatic",
+        filter: ResampleFilter = "automatic",
         source_from_target: ArrayLike | None = None,
         max_bytes: int = 1 << 30,
     ) -> None:
@@ -94,7 +95,7 @@ def make_resampler(
     source: _core.EnvMapLayout,
     projection: str,
     size: int | tuple[int, int],
-    filter: str,
+    filter: ResampleFilter,
     source_from_target: ArrayLike | None,
     max_bytes: int,
 ) -> _core.Resampler:

@@ -1,6 +1,8 @@
 """Environment maps through Python: no copies, shapes, errors, and properties of random maps."""
 
+import copy
 import os
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 
 from mirrorbake import _core
 from mirrorbake.envmap import EnvMap, Resampler
+from mirrorbake.literals import MipFilter, ResampleFilter, SampleFilter
 from mirrorbake.projection import directions_from_points, points_from_directions, texel_directions
 
 PROJECTIONS = ["cube", "dual_paraboloid", "sphere_map", "latlong", "angular", "fisheye:360"]
@@ -52,7 +55,7 @@ def test_shapes_that_fit_no_projection_are_refused() -> None:
     seed=st.integers(0, 1000),
 )
 def test_resampling_stays_within_the_range_of_the_source(
-    source: str, target: str, source_size: int, target_size: int, filter: str, seed: int
+    source: str, target: str, source_size: int, target_size: int, filter: ResampleFilter, seed: int
 ) -> None:
     envmap = noise(source, source_size, seed)
     result = envmap.resample(target, (target_size, target_size), filter=filter)
@@ -91,7 +94,7 @@ def test_a_resampler_names_the_argument_that_it_cannot_use() -> None:
     filter=st.sampled_from(["solid_angle", "seamless"]),
     seed=st.integers(0, 1000),
 )
-def test_every_mip_level_keeps_the_flux(projection: str, size: int, filter: str, seed: int) -> None:
+def test_every_mip_level_keeps_the_flux(projection: str, size: int, filter: MipFilter, seed: int) -> None:
     mips = noise(projection, size, seed).mips(filter)
     for level in range(1, mips.levels):
         np.testing.assert_allclose(mips.flux(level), mips.flux(0), rtol=1e-6)
@@ -99,7 +102,7 @@ def test_every_mip_level_keeps_the_flux(projection: str, size: int, filter: str,
 
 @pytest.mark.parametrize("projection", ["cube", "dual_paraboloid", "latlong"])
 @pytest.mark.parametrize("filter", ["nearest", "bilinear", "trilinear", "ewa"])
-def test_lookups_find_the_direction_that_was_stored(projection: str, filter: str) -> None:
+def test_lookups_find_the_direction_that_was_stored(projection: str, filter: SampleFilter) -> None:
     faces = {"cube": 6, "dual_paraboloid": 2}.get(projection, 1)
     stored = np.stack([texel_directions(projection, 64, 64, face) for face in range(faces)])
     envmap = EnvMap.from_array(stored if faces > 1 else stored[0], projection).mips("solid_angle")
@@ -119,6 +122,21 @@ def test_lookups_refuse_what_has_no_answer() -> None:
         envmap.sample([1.0, 0, 0], filter="ewa")
     assert envmap.sample([1.0, 0, 0]).shape == (3,)
     assert envmap.sample(np.ones((2, 5, 3))).shape == (2, 5, 3)
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_maps_pickle_copy_and_are_arrays_and_pictures(projection: str) -> None:
+    made = noise(projection, 8).mips() if projection == "cube" else noise(projection, 8)
+    for again in (pickle.loads(pickle.dumps(made)), copy.copy(made), copy.deepcopy(made)):
+        assert again.layout == made.layout
+        assert again.channels == made.channels
+        np.testing.assert_array_equal(again.values, made.values)
+    np.testing.assert_array_equal(np.asarray(made), made.level())
+    assert np.shares_memory(np.asarray(made), made.values)
+    assert not np.shares_memory(np.array(made), made.values)
+    assert np.asarray(made, np.float64).dtype == np.float64
+    assert projection in repr(made)
+    assert made._repr_png_().startswith(b"\x89PNG")
 
 
 def test_levels_broadcast_to_the_directions_and_a_bias_adds_to_them() -> None:
@@ -220,7 +238,9 @@ def test_half_is_what_numpy_rounds_to_but_for_what_it_cannot_hold() -> None:
 
 @pytest.mark.skipif("MIRRORBAKE_TEST_DATA" not in os.environ, reason="MIRRORBAKE_TEST_DATA is not set")
 @pytest.mark.parametrize("filter", ["area", "automatic"])
-def test_the_flux_of_a_photographed_panorama_is_kept_between_any_two_projections(filter: str) -> None:
+def test_the_flux_of_a_photograph_is_kept_between_any_two_projections(
+    filter: ResampleFilter,
+) -> None:
     panorama = EnvMap.load(Path(os.environ["MIRRORBAKE_TEST_DATA"]) / "workshop.exr")
     # About as many texels each.
     sizes = {"cube": 209, "dual_paraboloid": 362, "sphere_map": 512, "latlong": 362, "angular": 512}

@@ -212,24 +212,24 @@ def test_the_static_map_of_all_parts_is_there_once(glb: Glb) -> None:
 
 
 def test_a_metal_is_a_metal_of_its_colour_and_glass_has_its_index() -> None:
-    schlick = _core.Fresnel(_core.FresnelModel.schlick, (0.9, 0.6, 0.3))
+    schlick = _core.Fresnel("schlick", (0.9, 0.6, 0.3))
     gold, _ = gltf_material(_core.Material(name="gold", specular=True, albedo=(0, 0, 0), fresnel=schlick))
     assert gold["pbrMetallicRoughness"]["metallicFactor"] == 1.0
     np.testing.assert_allclose(
         gold["pbrMetallicRoughness"]["baseColorFactor"], [0.9, 0.6, 0.3, 1.0], rtol=1e-6
     )
     # Silver at 550 nm, n = 0.125, k = 3.34: ((n-1)² + k²) / ((n+1)² + k²).
-    silver = _core.Fresnel(_core.FresnelModel.conductor, eta=(0.125,) * 3, k=(3.34,) * 3)
+    silver = _core.Fresnel("conductor", eta=(0.125,) * 3, k=(3.34,) * 3)
     metal, _ = gltf_material(_core.Material(name="silver", specular=True, fresnel=silver))
     expected = (0.875**2 + 3.34**2) / (1.125**2 + 3.34**2)
     np.testing.assert_allclose(metal["pbrMetallicRoughness"]["baseColorFactor"][:3], expected, rtol=1e-4)
-    glass = _core.Fresnel(_core.FresnelModel.dielectric, eta=(1.6,) * 3)
+    glass = _core.Fresnel("dielectric", eta=(1.6,) * 3)
     coat, _ = gltf_material(
         _core.Material(name="glass", specular=True, albedo=(0.2, 0.3, 0.4), fresnel=glass)
     )
     assert coat["pbrMetallicRoughness"]["metallicFactor"] == 0.0
     assert coat["extensions"]["KHR_materials_ior"]["ior"] == pytest.approx(1.6, rel=1e-6)
-    tinted = _core.Fresnel(_core.FresnelModel.schlick, (0.04, 0.02, 0.01))
+    tinted = _core.Fresnel("schlick", (0.04, 0.02, 0.01))
     coat, _ = gltf_material(_core.Material(name="tinted", specular=True, fresnel=tinted))
     colour = coat["extensions"]["KHR_materials_specular"]["specularColorFactor"]
     np.testing.assert_allclose(colour, [1.0, 0.5, 0.25], rtol=1e-5)

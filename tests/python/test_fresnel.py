@@ -172,7 +172,7 @@ def test_bad_parameters_are_value_errors_that_name_them() -> None:
     with pytest.raises(ValueError, match="metal is mithril"):
         fresnel.metal_reflectance("mithril", 1.0)
     with pytest.raises(ValueError, match="illuminant is D50"):
-        fresnel.metal_reflectance("gold", 1.0, "D50")
+        fresnel.metal_reflectance("gold", 1.0, "D50")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("wanted", [1e-2, 1e-3, 1e-4])

@@ -40,7 +40,7 @@ def test_bad_files_and_arguments_raise_the_promised_errors(tmp_path: Path) -> No
     with pytest.raises(OSError, match="does not exist"):
         _core.load_image(str(tmp_path / "missing.exr"))
     with pytest.raises(ValueError, match="format is int3"):
-        _core.save_image(str(tmp_path / "a.exr"), np.ones((2, 2, 3), np.float32), None, "int3")
+        _core.save_image(str(tmp_path / "a.exr"), np.ones((2, 2, 3), np.float32), None, "int3")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="at least one pixel"):
         _core.save_image(str(tmp_path / "a.exr"), np.ones((0, 2, 3), np.float32))
 

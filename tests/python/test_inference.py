@@ -25,9 +25,7 @@ def trace() -> mb.LayerTrace:
     """A mirror ball under a light, in a box of coloured walls."""
     scene = mb.Scene()
     mirror = scene.add_material(
-        mb.Material(
-            albedo=(0, 0, 0), specular=True, fresnel=mb.Fresnel(mb.FresnelModel.constant, r0=(1, 1, 1))
-        )
+        mb.Material(albedo=(0, 0, 0), specular=True, fresnel=mb.Fresnel("constant", r0=(1, 1, 1)))
     )
     ball = scene.add_object("ball", mb.make_sphere((0, 0, 0), 1.0), mirror)
     corners = [(-3, -2, -4), (3, -2, -4), (-3, -2, 4)]
@@ -36,7 +34,7 @@ def trace() -> mb.LayerTrace:
         colour = tuple(0.8 if number == channel else 0.2 for channel in range(3))
         wall = scene.add_material(mb.Material(albedo=colour, emission=colour))
         scene.add_object(f"wall {number}", mb.make_rectangle(corner, u, v), wall)
-    tracer = mb.Tracer(scene, mb.TracerOptions(indirect=mb.IndirectLight.none))
+    tracer = mb.Tracer(scene, mb.TracerOptions(indirect="none"))
     camera = mb.Camera((0, 0.5, 3.5), (0, 0, 0), vertical_fov_degrees=45, width=SIZE, height=SIZE)
     return tracer.trace_layers(camera, ball, mb.TraceOptions(samples_per_pixel=SAMPLES))
 

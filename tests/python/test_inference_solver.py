@@ -27,11 +27,9 @@ def samples() -> mb.SurfaceSamples:
 
 def trace(size: int) -> mb.SurfaceSamples:
     scene = mb.make_room()
-    chrome = mb.Material(
-        albedo=(0, 0, 0), specular=True, fresnel=mb.Fresnel(mb.FresnelModel.constant, r0=(1, 1, 1))
-    )
+    chrome = mb.Material(albedo=(0, 0, 0), specular=True, fresnel=mb.Fresnel("constant", r0=(1, 1, 1)))
     teapot = scene.add_object("teapot", mb.make_teapot(6), scene.add_material(chrome), mb.teapot_part_names())
-    tracer = mb.Tracer(scene, mb.TracerOptions(indirect=mb.IndirectLight.none))
+    tracer = mb.Tracer(scene, mb.TracerOptions(indirect="none"))
     camera = mb.Camera((0, 0.25, 0.6), (0, 0.08, 0), vertical_fov_degrees=25, width=size, height=size)
     return tracer.trace_layers(camera, teapot, mb.TraceOptions(samples_per_pixel=4)).samples
 

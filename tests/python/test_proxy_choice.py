@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from mirrorbake._core import (
     Camera,
-    IndirectLight,
     Material,
     Scene,
     Tracer,
@@ -111,7 +110,7 @@ def test_choice_is_near_the_best_shape_in_unseen_views(name: str, expected: str 
     reflector = scene.add_object(
         "teapot", teapot, scene.add_material(Material(name="mirror", specular=True)), teapot_part_names()
     )
-    tracer = Tracer(scene, TracerOptions(indirect=IndirectLight.none))
+    tracer = Tracer(scene, TracerOptions(indirect="none"))
     origin = area_weighted_centroid(teapot.positions, teapot.triangles)
     choice = choose_proxy(
         *reflections(tracer, reflector, [0, 10, 20, 30]), origin=origin, max_rays_per_view=300
@@ -143,7 +142,7 @@ def test_teapot_splits_into_hull_and_dents() -> None:
     scene.add_object(
         "teapot", teapot, scene.add_material(Material(name="mirror", specular=True)), teapot_part_names()
     )
-    tracer = Tracer(scene, TracerOptions(indirect=IndirectLight.none))
+    tracer = Tracer(scene, TracerOptions(indirect="none"))
     rng = np.random.default_rng(1)
     corners = np.asarray(teapot.positions, np.float64)[teapot.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -1,5 +1,7 @@
 """Scenes from Python: what goes in comes out, and what is wrong is named."""
 
+import copy
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 
@@ -58,8 +60,8 @@ def test_bad_meshes_are_rejected_by_field() -> None:
 
 def test_scene_holds_what_is_added() -> None:
     scene = _core.Scene()
-    texture = scene.add_texture(np.full((2, 4, 3), 0.25, dtype=np.float32), wrap_v=_core.TextureWrap.clamp)
-    fresnel = _core.Fresnel(_core.FresnelModel.schlick, r0=(0.9, 0.8, 0.7))
+    texture = scene.add_texture(np.full((2, 4, 3), 0.25, dtype=np.float32), wrap_v="clamp")
+    fresnel = _core.Fresnel("schlick", r0=(0.9, 0.8, 0.7))
     material = scene.add_material(
         _core.Material(
             name="gold",
@@ -68,11 +70,11 @@ def test_scene_holds_what_is_added() -> None:
             specular=True,
             fresnel=fresnel,
             specular_texture=_core.TextureReference(texture, scale=(2, 3), rotation=0.5),
-            lobe=_core.SpecularLobe.ggx,
+            lobe="ggx",
             roughness=0.25,
             roughness_texture=_core.TextureReference(texture),
             exponent=20.0,
-            layers=_core.LayerModel.coated,
+            layers="coated",
             emission=(0, 0, 1),
             emission_texture=_core.TextureReference(texture, offset=(0.25, 0.5)),
         )
@@ -94,20 +96,20 @@ def test_scene_holds_what_is_added() -> None:
     assert scene.bounds(0) == ((0, 0, 0), (1, 2, 0))
     np.testing.assert_array_equal(scene.object_mesh(0).parts, [0, 1])
     back = scene.material(0)
-    assert back.fresnel.model == _core.FresnelModel.schlick
+    assert back.fresnel.model == "schlick"
     np.testing.assert_allclose(back.fresnel.r0, (0.9, 0.8, 0.7), rtol=1e-7)
-    assert back.layers == _core.LayerModel.coated
+    assert back.layers == "coated"
     assert back.albedo_texture == _core.TextureReference(texture)
     assert back.albedo_texture != _core.TextureReference(texture, rotation=1.0)
     assert back.albedo_texture != texture
     assert (back.specular_texture.scale, back.specular_texture.rotation) == ((2, 3), 0.5)
-    assert (back.lobe, back.roughness, back.exponent) == (_core.SpecularLobe.ggx, 0.25, 20.0)
+    assert (back.lobe, back.roughness, back.exponent) == ("ggx", 0.25, 20.0)
     assert back.roughness_texture.texture == texture
     assert back.emission_texture.offset == (0.25, 0.5)
-    assert repr(back.roughness_texture).startswith("TextureReference(0, offset=(0, ")
-    back.fresnel = _core.Fresnel(_core.FresnelModel.conductor, eta=(0.2, 0.9, 1.1), k=(3.9, 2.4, 2.2))
+    assert repr(back.roughness_texture).startswith("TextureReference(texture=0, offset=(")
+    back.fresnel = _core.Fresnel("conductor", eta=(0.2, 0.9, 1.1), k=(3.9, 2.4, 2.2))
     scene.set_material(0, back)
-    assert scene.material(0).fresnel.model == _core.FresnelModel.conductor
+    assert scene.material(0).fresnel.model == "conductor"
 
 
 def test_scene_errors_name_the_culprit() -> None:
@@ -189,3 +191,34 @@ def test_shapes_have_their_extent(
     mesh = make()
     assert np.allclose(_core.bounds(mesh), (low, high), atol=1e-6)
     assert mesh.normals.shape == mesh.positions.shape
+
+
+def test_meshes_materials_and_options_pickle_and_copy() -> None:
+    mesh = _core.make_sphere((0, 1, 0), 0.5, 8)
+    for again in (pickle.loads(pickle.dumps(mesh)), copy.copy(mesh), copy.deepcopy(mesh)):
+        for name in ("positions", "normals", "uvs", "triangles", "parts", "colors"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(mesh, name))
+    metal = _core.Fresnel("conductor", eta=(0.2, 0.9, 1.4), k=(3.9, 2.5, 1.6))
+    material = _core.Material(name="gold", specular=True, fresnel=metal, lobe="ggx", opacity_cutoff=0.25)
+    options = [
+        _core.TraceOptions(window=(1, 2, 3, 4)),
+        _core.TracerOptions(indirect="path"),
+        _core.SolveOptions(),
+    ]
+    for thing in [material, *options]:
+        assert repr(pickle.loads(pickle.dumps(thing))) == repr(copy.deepcopy(thing)) == repr(thing)
+    assert "lobe='ggx'" in repr(material)
+    assert "model='conductor'" in repr(material)
+
+
+def test_an_unknown_name_is_an_error_that_lists_the_known_ones() -> None:
+    with pytest.raises(_core.InvalidArgument, match="indirect is photons, expected none, cached or path"):
+        _core.TracerOptions(indirect="photons")  # type: ignore[arg-type]
+
+
+def test_paths_may_be_of_pathlib(tmp_path: Path) -> None:
+    path = tmp_path / "ü.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="utf-8")
+    assert len(_core.load_mesh(path).triangles) == len(_core.load_mesh(str(path)).triangles) == 1
+    with pytest.raises(TypeError):
+        _core.load_mesh(7)  # type: ignore[arg-type]

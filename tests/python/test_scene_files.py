@@ -90,7 +90,7 @@ def top_view(scene: _core.Scene, size: int = 32, spp: int = 256) -> NDArray[np.f
     camera = _core.Camera(
         (0, 100, 0), (0, 0, 0), (0, 0, -1), math.degrees(2 * math.atan(1 / 100)), size, size
     )
-    tracer = _core.Tracer(scene, _core.TracerOptions(indirect=_core.IndirectLight.none))
+    tracer = _core.Tracer(scene, _core.TracerOptions(indirect="none"))
     return np.asarray(tracer.trace_beauty(camera, _core.TraceOptions(samples_per_pixel=spp)))[..., :3]
 
 
@@ -366,7 +366,7 @@ def test_a_texture_that_stays_in_its_file_looks_like_one_in_memory(tmp_path: Pat
     for in_file in (False, True):
         scene = mirrorbake.Scene()
         if in_file:
-            texture = scene.add_texture_file(str(tmp_path / "map.png"), transfer=_core.Transfer.srgb)
+            texture = scene.add_texture_file(str(tmp_path / "map.png"), transfer="srgb")
         else:
             texture = scene.add_texture(mirrorbake.load_image(str(tmp_path / "map.png"))[0])
         reference = mirrorbake.TextureReference(texture)
@@ -410,7 +410,7 @@ def test_an_obj_scene_has_its_materials(tmp_path: Path) -> None:
     loaded = mirrorbake.load_scene(str(path))
     assert loaded.scene.object_names == ["sail"]
     material = loaded.scene.material(0)
-    assert (material.lobe, material.exponent) == (mirrorbake.SpecularLobe.phong, 50.0)
+    assert (material.lobe, material.exponent) == ("phong", 50.0)
     assert (material.opacity, material.opacity_cutoff) == (0.75, None)
 
 

@@ -160,7 +160,7 @@ def test_a_gltf_scene_looks_as_in_mitsuba(tmp_path: Path) -> None:
     ball = _core.make_sphere((0, 0, 0), 1.0, 48)
     loaded = mirrorbake.load_scene(str(write_scene(tmp_path / "scene.glb", texels, ball)))
     assert not loaded.warnings
-    tracer = _core.Tracer(loaded.scene, _core.TracerOptions(indirect=_core.IndirectLight.path))
+    tracer = _core.Tracer(loaded.scene, _core.TracerOptions(indirect="path"))
     camera = _core.Camera(EYE, TARGET, vertical_fov_degrees=FOV, width=SIZE, height=SIZE)
     peer = mi.load_dict(peer_scene(tmp_path, texels, ball))
     ours, theirs = [], []

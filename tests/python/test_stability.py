@@ -29,12 +29,10 @@ def matrix() -> mb.RenderingMatrix:
     """A ball seen by 900 pixels: some 600 rows for 2046 texels, most of them between what the rows see."""
     scene = mb.Scene()
     mirror = scene.add_material(
-        mb.Material(
-            albedo=(0, 0, 0), specular=True, fresnel=mb.Fresnel(mb.FresnelModel.constant, r0=(1, 1, 1))
-        )
+        mb.Material(albedo=(0, 0, 0), specular=True, fresnel=mb.Fresnel("constant", r0=(1, 1, 1)))
     )
     ball = scene.add_object("ball", mb.make_sphere((0, 0, 0), 1.0), mirror)
-    tracer = mb.Tracer(scene, mb.TracerOptions(indirect=mb.IndirectLight.none))
+    tracer = mb.Tracer(scene, mb.TracerOptions(indirect="none"))
     camera = mb.Camera((0, 0.5, 3.5), (0, 0, 0), vertical_fov_degrees=45, width=30, height=30)
     samples = tracer.trace_visibility(camera, ball, mb.TraceOptions(samples_per_pixel=4))
     return mb.build_rendering_matrix(samples, 0, Proxy.box((0, 0, 0), (3, 2, 4)), LAYOUT)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mirrorbake import _core
-from mirrorbake._core import Camera, IndirectLight, TraceOptions, Tracer, TracerOptions
+from mirrorbake._core import Camera, TraceOptions, Tracer, TracerOptions
 from mirrorbake.envmap import EnvMap
 
 
@@ -17,7 +17,7 @@ def scene_with_ring() -> tuple[_core.Scene, int]:
     metal = _core.Material()
     metal.specular = True
     metal.albedo = (0.1, 0.1, 0.2)
-    metal.fresnel = _core.Fresnel(_core.FresnelModel.schlick, r0=(0.9, 0.7, 0.5))
+    metal.fresnel = _core.Fresnel("schlick", r0=(0.9, 0.7, 0.5))
     grey = _core.Material()
     grey.albedo = (0.5, 0.5, 0.5)
     ring = scene.add_object("ring", _core.make_torus((0, 1, 0), 0.5, 0.3, 32), scene.add_material(metal))
@@ -34,7 +34,7 @@ CAMERA = Camera((0.4, 2.9, 1.6), (0, 1, 0), width=24, height=16)
 
 @pytest.fixture(scope="module")
 def tracer() -> Tracer:
-    return Tracer(scene_with_ring()[0], TracerOptions(indirect=IndirectLight.cached, cache_rays=16))
+    return Tracer(scene_with_ring()[0], TracerOptions(indirect="cached", cache_rays=16))
 
 
 def test_camera_holds_its_arguments_and_rejects_nonsense() -> None:
@@ -59,9 +59,9 @@ def test_options_take_keywords_and_stay_writable() -> None:
     assert (options.max_diffuse_depth, options.seed) == (1, 9)
     options.samples_per_pixel = 5
     assert options.samples_per_pixel == 5
-    made = TracerOptions(indirect=IndirectLight.path, cache_rays=7, cache_bounces=2, seed=4)
-    assert (made.indirect, made.cache_rays, made.cache_bounces, made.seed) == (IndirectLight.path, 7, 2, 4)
-    assert TracerOptions().indirect == IndirectLight.cached
+    made = TracerOptions(indirect="path", cache_rays=7, cache_bounces=2, seed=4)
+    assert (made.indirect, made.cache_rays, made.cache_bounces, made.seed) == ("path", 7, 2, 4)
+    assert TracerOptions().indirect == "cached"
 
 
 def test_layers_and_samples_recompose_the_beauty(tracer: Tracer) -> None:
@@ -88,7 +88,7 @@ def test_layers_and_samples_recompose_the_beauty(tracer: Tracer) -> None:
 def test_several_reflectors_are_traced_in_one_call() -> None:
     scene, ring = scene_with_ring()
     ball = scene.add_object("ball", _core.make_sphere((1, 0.5, 0), 0.4, 24), scene.object_material(ring))
-    tracer = Tracer(scene, TracerOptions(indirect=IndirectLight.none))
+    tracer = Tracer(scene, TracerOptions(indirect="none"))
     options = TraceOptions(samples_per_pixel=4)
     together = tracer.trace_layers_of(CAMERA, [ring, ball], options)
     assert len(together) == 2

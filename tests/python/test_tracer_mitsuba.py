@@ -226,7 +226,7 @@ def mirror_ball(directory: Path) -> Twin:
     add_room(twin)
     reflectance = (0.9, 0.8, 0.7)
     material = core.Material(
-        specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel(core.FresnelModel.constant, r0=reflectance)
+        specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel("constant", r0=reflectance)
     )
     bsdf = {"type": "conductor", "material": "none", "specular_reflectance": rgb(reflectance)}
     twin.add(core.make_sphere((0, 1, 0), 0.7, 48), material, bsdf)
@@ -238,9 +238,7 @@ def gold_ring(directory: Path) -> Twin:
     twin = Twin(directory, **IN_ROOM)
     add_room(twin)
     eta, k = (0.189, 0.543, 1.332), (3.071, 2.231, 1.869)
-    material = core.Material(
-        specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel(core.FresnelModel.conductor, eta=eta, k=k)
-    )
+    material = core.Material(specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel("conductor", eta=eta, k=k))
     twin.add(
         core.make_torus((0, 1, 0), 0.6, 0.3, 48),
         material,
@@ -295,8 +293,8 @@ def rough_metal(directory: Path) -> Twin:
     material = core.Material(
         specular=True,
         albedo=(0, 0, 0),
-        fresnel=core.Fresnel(core.FresnelModel.conductor, eta=eta, k=k),
-        lobe=core.SpecularLobe.ggx,
+        fresnel=core.Fresnel("conductor", eta=eta, k=k),
+        lobe="ggx",
         roughness=alpha,
     )
     bsdf = {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "eta": rgb(eta), "k": rgb(k)}
@@ -322,8 +320,8 @@ def coated_ball(directory: Path) -> Twin:
         (core.TriangleMesh(ball.positions, ball.triangles), (0.8, 0.3, 0.2), 1.5),
         (core.make_box((-1.2, 0, -1.0), (-0.3, 1.3, -0.2)), (0.2, 0.4, 0.8), 2.0),
     ):
-        fresnel = core.Fresnel(core.FresnelModel.dielectric, eta=(ior,) * 3)
-        material = core.Material(specular=True, albedo=albedo, fresnel=fresnel, layers=core.LayerModel.coated)
+        fresnel = core.Fresnel("dielectric", eta=(ior,) * 3)
+        material = core.Material(specular=True, albedo=albedo, fresnel=fresnel, layers="coated")
         bsdf = {"type": COATED, "int_ior": ior}
         bsdf |= dict(zip(("albedo_r", "albedo_g", "albedo_b"), albedo, strict=True))
         twin.add(mesh, material, bsdf)
@@ -336,7 +334,7 @@ def silver_teapot(directory: Path) -> Twin:
     add_room(twin)
     reflectance = (0.95, 0.93, 0.88)
     material = core.Material(
-        specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel(core.FresnelModel.constant, r0=reflectance)
+        specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel("constant", r0=reflectance)
     )
     bsdf = {"type": "conductor", "material": "none", "specular_reflectance": rgb(reflectance)}
     teapot = core.make_teapot(12, 1.2)
@@ -362,9 +360,7 @@ def textured_room(directory: Path) -> Twin:
         material = core.Material(albedo=(1, 1, 1), albedo_texture=core.TextureReference(texture))
         twin.add(core.make_rectangle(corner, u, v), material, {"type": "diffuse", "reflectance": bitmap})
     reflectance = (0.9, 0.9, 0.9)
-    mirror = core.Material(
-        specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel(core.FresnelModel.constant, r0=reflectance)
-    )
+    mirror = core.Material(specular=True, albedo=(0, 0, 0), fresnel=core.Fresnel("constant", r0=reflectance))
     bsdf = {"type": "conductor", "material": "none", "specular_reflectance": rgb(reflectance)}
     twin.add(core.make_sphere((0, 1, 0), 0.7, 48), mirror, bsdf)
     return twin
@@ -452,7 +448,7 @@ def blocks(image: Any) -> Any:
 def test_path_traced_image_agrees_with_mitsuba(make: Any, tmp_path: Path) -> None:
     mi.set_variant("scalar_rgb")
     twin = make(tmp_path)
-    tracer = core.Tracer(twin.scene, core.TracerOptions(indirect=core.IndirectLight.path))
+    tracer = core.Tracer(twin.scene, core.TracerOptions(indirect="path"))
     camera = twin.camera()
     peer = twin.load_peer()
     ours, theirs = [], []
@@ -502,7 +498,7 @@ def test_tilted_normals_differ_from_mitsuba_only_where_they_turn_away_from_the_e
         twin.matte(tilted, (albedo,) * 3)
         rows = np.where(np.arange(1024) < 512, above, below).astype(np.float32)
         twin.sky(np.ascontiguousarray(np.broadcast_to(rows[:, None, None], (1024, 8, 3))))
-        tracer = core.Tracer(twin.scene, core.TracerOptions(indirect=core.IndirectLight.path))
+        tracer = core.Tracer(twin.scene, core.TracerOptions(indirect="path"))
         traced = tracer.trace_beauty(twin.camera(), core.TraceOptions(samples_per_pixel=256))
         peer = np.array(mi.render(twin.load_peer(), spp=1024))
         # The square fills the middle of the image. The panorama fades over 0.2 degrees at its horizon, and

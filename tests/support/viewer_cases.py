@@ -68,8 +68,7 @@ def cases() -> list[Case]:
         (0.0, 0.1, 0.0), (0.25, 0.12, 0.19), (0.0, 0.1, 0.0), np.array(TURNED, np.float32)
     )
     straight, turned = np.eye(3, dtype=np.float32), np.array(TURNED, np.float32)
-    model = _core.FresnelModel
-    schlick = _core.Fresnel(model=model.schlick, r0=(0.9, 0.7, 0.5))
+    schlick = _core.Fresnel(model="schlick", r0=(0.9, 0.7, 0.5))
     return [
         Case("infinite", _core.Proxy.infinite(origin), local, schlick),
         Case("box", _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, straight), local, schlick),
@@ -77,14 +76,14 @@ def cases() -> list[Case]:
             "rotated-box",
             _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, turned),
             turned_local,
-            _core.Fresnel(model=model.dielectric, eta=(1.5, 1.6, 1.7)),
+            _core.Fresnel(model="dielectric", eta=(1.5, 1.6, 1.7)),
             coated=True,
         ),
         Case(
             "ellipsoid",
             _core.Proxy.ellipsoid((0, 0.5, 0), (3.0, 1.5, 2.0), origin, turned),
             local,
-            _core.Fresnel(model=model.conductor, eta=(0.2, 0.9, 1.3), k=(3.9, 2.5, 2.2)),
+            _core.Fresnel(model="conductor", eta=(0.2, 0.9, 1.3), k=(3.9, 2.5, 2.2)),
         ),
         Case(
             "sphere",
@@ -102,7 +101,7 @@ def cases() -> list[Case]:
             "hemisphere",
             _core.Proxy.hemisphere((0, -0.05, 0), 2.0, origin, turned),
             local,
-            _core.Fresnel(model=model.constant, r0=(0.8, 0.8, 0.8)),
+            _core.Fresnel(model="constant", r0=(0.8, 0.8, 0.8)),
         ),
         Case("textured", _core.Proxy.infinite(origin), local, schlick, textured=True),
         Case(
@@ -197,7 +196,7 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
         specular=True,
         fresnel=case.fresnel,
         albedo=(0.4, 0.4, 0.4),
-        layers=_core.LayerModel.coated if case.coated else _core.LayerModel.additive,
+        layers="coated" if case.coated else "additive",
     )
     uvs = colors = None
     if case.textured:
@@ -205,8 +204,8 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
         colors = (0.75 + 0.25 * normals).astype(np.float32)
         use = _core.TextureReference
         material.albedo_texture = use(scene.add_texture(_waves(0.3)), rotation=0.4, scale=(1.5, 0.7))
-        mirrored = _core.TextureWrap.mirror
-        material.specular_texture = use(scene.add_texture(_waves(1.7), mirrored, mirrored), offset=(0.3, 0.1))
+        mirrored = scene.add_texture(_waves(1.7), "mirror", "mirror")
+        material.specular_texture = use(mirrored, offset=(0.3, 0.1))
         material.normal_texture = use(scene.add_texture(_bumps()))
         material.colors_tint_reflectance = True
     pose = _pose(case, t)

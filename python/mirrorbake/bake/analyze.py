@@ -107,7 +107,7 @@ def _samples(stage: Stage, depth: int) -> Decision:
     config, material = stage.config, _material(stage)
     if config.trace.samples is not None:
         return Decision("trace.samples", None, config.trace.samples, False, _SET, None)
-    if material.lobe == _core.SpecularLobe.mirror:
+    if material.lobe == "mirror":
         reason = "a mirror needs one direction per sample, so that samples only smooth edges"
         return Decision("trace.samples", None, MIRROR_SAMPLES, True, reason, None)
     probe = Probe.of(stage, depth, LOBE_PROBE_SAMPLES)
@@ -116,7 +116,7 @@ def _samples(stage: Stage, depth: int) -> Decision:
     samples = min(max(2 ** math.ceil(math.log2(wanted)), MIRROR_SAMPLES), MOST_SAMPLES)
     reason = (
         f"samples of a pixel differ by {spread:.0%} since each takes one direction of the "
-        f"{material.lobe.name} lobe; {samples} leave a noise of {spread / math.sqrt(samples):.1%}"
+        f"{material.lobe} lobe; {samples} leave a noise of {spread / math.sqrt(samples):.1%}"
     )
     return Decision("trace.samples", None, samples, True, reason, spread)
 
@@ -287,9 +287,9 @@ def _lobe_width(material: _core.Material) -> float:
     """Full width at half of its height, radians, of a lobe along the normal; 0: a mirror, or not known."""
     if material.roughness_texture.texture >= 0:
         return 0.0
-    if material.lobe == _core.SpecularLobe.phong:
+    if material.lobe == "phong":
         return 2.0 * math.acos(0.5 ** (1.0 / material.exponent))
-    if material.lobe == _core.SpecularLobe.ggx:
+    if material.lobe == "ggx":
         # The density of facets goes with (1 + tan²/α²)⁻², which is half at tan² = (√2 − 1)α²; reflection
         # doubles angles.
         return 4.0 * math.atan(material.roughness * math.sqrt(math.sqrt(2.0) - 1.0))

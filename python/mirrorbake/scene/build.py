@@ -190,7 +190,7 @@ def _material(config: MaterialConfig, scene: _core.Scene) -> int:
     if config.metal is not None:
         fit = _core.fit_metal(config.metal, ILLUMINANT)
         eta, k = fit.eta, fit.k
-    model = getattr(_core.FresnelModel, config.fresnel)
+    model = config.fresnel
     fresnel = _core.Fresnel(model=model, r0=config.r0 or (0.9, 0.9, 0.9), eta=eta, k=k)
     texture = _core.TextureReference()
     if config.texture is not None:
@@ -201,7 +201,7 @@ def _material(config: MaterialConfig, scene: _core.Scene) -> int:
         fresnel=fresnel,
         albedo=config.albedo,
         albedo_texture=texture,
-        layers=getattr(_core.LayerModel, config.layers),
+        layers=config.layers,
     )
     return scene.add_material(material)
 

@@ -7,7 +7,7 @@ Keys that are not known are errors, so that a misspelt one is found.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
@@ -24,7 +24,7 @@ from mirrorbake.scene.config_values import (
 )
 from mirrorbake.scene.config_views import Light, Motion, Views
 
-ILLUMINANT = "D65"
+ILLUMINANT: Final = "D65"
 """Under which the colours of metals are meant: the white of Rec.709."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from mirrorbake import _core
 from mirrorbake.files import sha256_of
@@ -12,12 +12,15 @@ from mirrorbake.scene.config import (
     SceneConfig,
 )
 
+if TYPE_CHECKING:
+    from mirrorbake.literals import FileContent
+
 Inputs: TypeAlias = dict[str, dict[str, Any]]
 """Files of a scene: key → {path, sha256, files}; `files`, if it refers to any, are {name: sha256}."""
 
-_CONTENT = {
-    "reflector.mesh": _core.FileContent.mesh,
-    "surroundings.scene": _core.FileContent.scene,
+_CONTENT: dict[str, FileContent] = {
+    "reflector.mesh": "mesh",
+    "surroundings.scene": "scene",
 }
 """Inputs that refer to further files."""
 

@@ -84,7 +84,7 @@ def prepare_stage(config: SceneConfig) -> Stage:
 def _prepared(config: SceneConfig, point: Point | None) -> Stage:
     built = build_scene(config, point)
     options = _core.TracerOptions(
-        indirect=getattr(_core.IndirectLight, config.trace.indirect),
+        indirect=config.trace.indirect,
         cache_rays=config.trace.cache_rays,
         seed=config.trace.seed,
     )

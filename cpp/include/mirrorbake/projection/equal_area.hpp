@@ -2,8 +2,8 @@
 
 #include "mirrorbake/projection/map_point.hpp"
 
-/// The cylindrical equal-area projection (spec P8; Hall, in [WP]; Lambert 1772): longitude against the sine of
-/// latitude, so that all texels see the same solid angle. x is the longitude over π, y the sine of the
+/// The cylindrical equal-area projection (spec P8; Hall, in [WP]; Lambert 1772): longitude against the sine
+/// of latitude, so that all texels see the same solid angle. x is the longitude over π, y the sine of the
 /// latitude; centre and sides are those of latlong.
 namespace mirrorbake {
 

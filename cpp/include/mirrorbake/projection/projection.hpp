@@ -13,8 +13,8 @@
 
 #include "mirrorbake/projection/map_point.hpp"
 
-/// All projections behind one interface (spec P1–P6, P8). Computed in double; the batch functions read and write
-/// float32.
+/// All projections behind one interface (spec P1–P6, P8). Computed in double; the batch functions read and
+/// write float32.
 namespace mirrorbake {
 
 enum class ProjectionKind { cube, dual_paraboloid, sphere_map, latlong, angular, fisheye, equal_area };

@@ -83,7 +83,7 @@ def export_glb(
     }
     described["extensions"][EXTENSION] = {
         "fresnel": fresnel_description(material.fresnel),
-        "layers": material.layers.name,
+        "layers": material.layers,
         "albedo": list(material.albedo),
     }
     file.document.update(

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mirrorbake import _core
 from mirrorbake.fresnel import conductor
 from mirrorbake.pem.export.images import linear_codes, srgb_codes
 from mirrorbake.pem.export.materials import TextureUse
@@ -16,6 +15,7 @@ from mirrorbake.pem.export.materials import TextureUse
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from mirrorbake import _core
     from mirrorbake.pem.export.glb_file import GlbFile
     from mirrorbake.pem.export.materials import Material, TextureImage
 
@@ -37,8 +37,8 @@ def gltf_material(material: _core.Material) -> tuple[dict[str, Any], list[str]]:
     roughness = _perceptual_roughness(material)
     result: dict[str, Any] = {"name": material.name}
     r0 = _normal_reflectance(fresnel)
-    dielectric = fresnel.model == _core.FresnelModel.dielectric or (
-        fresnel.model != _core.FresnelModel.conductor and max(r0) <= _LARGEST_DIELECTRIC_R0
+    dielectric = fresnel.model == "dielectric" or (
+        fresnel.model != "conductor" and max(r0) <= _LARGEST_DIELECTRIC_R0
     )
     if dielectric:
         # glTF: F0 = ((ior - 1)/(ior + 1))² · specularColorFactor, F90 = 1.
@@ -88,10 +88,10 @@ def _transform(use: TextureUse) -> dict[str, Any]:
 
 def fresnel_description(fresnel: _core.Fresnel) -> dict[str, Any]:
     """What a shader needs to compute the reflectance; the names are those of the scene file."""
-    name = fresnel.model.name
-    if fresnel.model == _core.FresnelModel.dielectric:
+    name = fresnel.model
+    if fresnel.model == "dielectric":
         return {"model": name, "ior": list(fresnel.eta)}
-    if fresnel.model == _core.FresnelModel.conductor:
+    if fresnel.model == "conductor":
         return {"model": name, "eta": list(fresnel.eta), "k": list(fresnel.k)}
     return {"model": name, "r0": list(fresnel.r0)}
 
@@ -105,9 +105,9 @@ def _metallic_roughness(colour: Sequence[float], metallic: float, roughness: flo
 
 
 def _normal_reflectance(fresnel: _core.Fresnel) -> list[float]:
-    if fresnel.model == _core.FresnelModel.dielectric:
+    if fresnel.model == "dielectric":
         return [((n - 1.0) / (n + 1.0)) ** 2 for n in fresnel.eta]
-    if fresnel.model == _core.FresnelModel.conductor:
+    if fresnel.model == "conductor":
         pairs = zip(fresnel.eta, fresnel.k, strict=True)
         return [float(conductor(np.float64(1.0), eta, k)) for eta, k in pairs]
     return list(fresnel.r0)
@@ -115,8 +115,8 @@ def _normal_reflectance(fresnel: _core.Fresnel) -> list[float]:
 
 def _perceptual_roughness(material: _core.Material) -> float:
     """Roughness of glTF: it is the root of GGX's α; of a Phong lobe, α of the same width: √(2/(N + 2))."""
-    if material.lobe == _core.SpecularLobe.mirror:
+    if material.lobe == "mirror":
         return 0.0
-    if material.lobe == _core.SpecularLobe.phong:
+    if material.lobe == "phong":
         return math.sqrt(math.sqrt(2.0 / (material.exponent + 2.0)))
     return math.sqrt(material.roughness)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
+    from mirrorbake.literals import FaceLayout, PixelFormat
     from mirrorbake.pem.export.map_sets import MapSet, ShellMap
 
 DESCRIPTION_NAME = "maps.json"
@@ -155,8 +156,8 @@ def _write_shell(
     """Write one map. Returns the names of its files and how many values were clamped."""
     channels = ["R", "G", "B", "A"][: shell.channels]
 
-    def save(envmap: EnvMap, name: str, faces: str = "automatic") -> int:
-        return envmap.save(folder / name, faces=faces, format=precision).clamped_to_half
+    def save(envmap: EnvMap, name: str, faces: FaceLayout = "automatic") -> int:
+        return envmap.save(folder / name, faces=faces, format=cast("PixelFormat", precision)).clamped_to_half
 
     if format == "exr" and frame.panorama is not None:
         finest = EnvMap.from_array(shell.level(0), "cube", channels)

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from skimage.transform import resize_local_mean
 
-from mirrorbake import _core
-
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from mirrorbake import _core
     from mirrorbake.arrays import FloatArray
 
 
@@ -95,7 +94,7 @@ def export_materials(scene: _core.Scene, numbers: list[int]) -> Materials:
             wrap_u, wrap_v = scene.texture_wrap(reference.texture)
             textures[key] = TextureImage(
                 lambda largest: texture_pixels(scene, reference.texture, largest),
-                (wrap_u.name, wrap_v.name),
+                (wrap_u, wrap_v),
                 linear,
             )
         return TextureUse(
@@ -118,7 +117,7 @@ def export_materials(scene: _core.Scene, numbers: list[int]) -> Materials:
                 name=material.name,
                 fresnel=material.fresnel,
                 specular=material.specular,
-                coated=material.layers == _core.LayerModel.coated,
+                coated=material.layers == "coated",
                 albedo=(material.albedo[0], material.albedo[1], material.albedo[2]),
                 albedo_texture=use(material.albedo_texture) if max(material.albedo) > 0.0 else None,
                 reflectance_texture=use(material.specular_texture) if material.specular else None,

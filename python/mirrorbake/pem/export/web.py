@@ -225,7 +225,7 @@ def _material(material: Material) -> dict[str, Any]:
     return {
         "name": material.name,
         "specular": material.specular,
-        "fresnel": fresnel.model.name,
+        "fresnel": fresnel.model,
         "r0": list(fresnel.r0),
         "eta": list(fresnel.eta),
         "k": list(fresnel.k),

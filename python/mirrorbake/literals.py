@@ -1,0 +1,29 @@
+"""Types of the arguments that are one of several names, as the compiled part has them."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+__all__ = [
+    "ConventionWay",
+    "FaceLayout",
+    "FileContent",
+    "FresnelModel",
+    "Illuminant",
+    "MipFilter",
+    "PixelFormat",
+    "ResampleFilter",
+    "SampleFilter",
+    "TextureWrap",
+]
+
+ConventionWay: TypeAlias = Literal["from_foreign", "to_foreign"]
+FaceLayout: TypeAlias = Literal["automatic", "strip", "column", "grid", "cross", "vertical_cross", "files"]
+FileContent: TypeAlias = Literal["mesh", "scene"]
+FresnelModel: TypeAlias = Literal["constant", "schlick", "dielectric", "conductor"]
+Illuminant: TypeAlias = Literal["D65", "E"]
+MipFilter: TypeAlias = Literal["box", "solid_angle", "seamless"]
+PixelFormat: TypeAlias = Literal["automatic", "half", "float32", "uint8", "uint16"]
+ResampleFilter: TypeAlias = Literal["automatic", "area", "bilinear", "nearest"]
+SampleFilter: TypeAlias = Literal["nearest", "bilinear", "trilinear", "ewa"]
+TextureWrap: TypeAlias = Literal["repeat", "clamp", "mirror"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -42,7 +43,7 @@ from mirrorbake.pem.store import PemStore
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
-    from pathlib import Path
+    from os import PathLike
 
     from numpy.typing import NDArray
 
@@ -213,7 +214,7 @@ class Onlooker:
 
 
 def evaluate(
-    directory: Path,
+    directory: str | PathLike[str],
     progress: ProgressReport | None = None,
     stage: Stage | None = None,
     *,
@@ -243,6 +244,7 @@ def evaluate(
     StoreError
         As `open_pem` raises it.
     """
+    directory = Path(directory)
     report = progress or (lambda done, total, text: None)
     count = len(PemStore.open(directory).header.space)
     report(0, count, "preparing the scene")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mirrorbake import _core
@@ -11,7 +12,7 @@ from mirrorbake.pem.opened import open_pem
 from mirrorbake.pem.view_images import images_of_trace
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from os import PathLike
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.opened import OpenedPem
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 PICTURE_SUFFIXES = (".exr", ".png")
 
 
-def render(directory: Path, point: PointLike, out: Path) -> FloatArray:
+def render(directory: str | PathLike[str], point: PointLike, out: str | PathLike[str]) -> FloatArray:
     """Draw a PEM over its ray-traced background and write the picture.
 
     Parameters
@@ -43,10 +44,11 @@ def render(directory: Path, point: PointLike, out: Path) -> FloatArray:
     InputError
         The point is not of the space, or `out` has another suffix or cannot be written.
     """
+    out = Path(out)
     if out.suffix.lower() not in PICTURE_SUFFIXES:
         raise InputError(f"{out}: expected a name that ends in {' or '.join(PICTURE_SUFFIXES)}")
     check_writable(out)
-    picture = picture_of(open_pem(directory), point)
+    picture = picture_of(open_pem(Path(directory)), point)
     _core.save_image(str(out), picture, ["R", "G", "B"])
     return picture
 

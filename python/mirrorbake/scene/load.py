@@ -15,6 +15,8 @@ from mirrorbake.files import read_text
 from mirrorbake.scene.config import PATH_KEYS, SECTIONS, SceneConfig
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from pydantic_core import ErrorDetails
 
 MAX_SCENE_BYTES = 1 << 20
@@ -111,7 +113,9 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {failure}") from None
 
 
-def load_config(path: Path, overrides: Sequence[tuple[tuple[str, ...], Any]] = ()) -> SceneConfig:
+def load_config(
+    path: str | PathLike[str], overrides: Sequence[tuple[tuple[str, ...], Any]] = ()
+) -> SceneConfig:
     """Read and validate a scene file.
 
     Parameters
@@ -129,8 +133,8 @@ def load_config(path: Path, overrides: Sequence[tuple[tuple[str, ...], Any]] = (
         The file is missing or not TOML, or a key is wrong. It is an OptionError if the key, or one that it
         does not go with, is an override.
     """
-    data = _read_toml(path)
-    _resolve_paths(data, path.resolve().parent)
+    data = _read_toml(Path(path))
+    _resolve_paths(data, Path(path).resolve().parent)
     replacements: dict[str, Any] = {}
     for keys, value in overrides:
         _insert(replacements, keys, value)

@@ -29,8 +29,8 @@ struct SolveReport {
   int rounds = 0;          ///< after each of them the map is put within its bounds
   bool converged = false;  ///< the relative gradient met the tolerance
   /// What `tolerance` is compared with: the preconditioned gradient within the bounds, a texel on a bound
-  /// counting only if it wants inside (the conditions of Karush, Kuhn and Tucker), relative to that of the prior
-  /// or a black map; the largest of the channels.
+  /// counting only if it wants inside (the conditions of Karush, Kuhn and Tucker), relative to that of the
+  /// prior or a black map; the largest of the channels.
   double relative_gradient = 0;
   std::size_t unknowns = 0;           ///< texels that some row sees; the others are filled in smoothly
   double rms_error = 0;               ///< weighted root mean square of A x − b over rows and channels

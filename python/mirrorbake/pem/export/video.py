@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import av
@@ -15,7 +16,7 @@ from mirrorbake.tone import check_display, displayed, srgb_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
+    from os import PathLike
 
     from numpy.typing import NDArray
 
@@ -61,7 +62,7 @@ def walk(space: ParameterSpace, frames: int | None) -> list[Point]:
 
 def export_video(
     pem: OpenedPem,
-    out: Path,
+    out: str | PathLike[str],
     *,
     frames: int | None = None,
     frames_per_second: int = 30,
@@ -93,6 +94,7 @@ def export_video(
     OptionError
         A number is out of its range, or the PEM has no axis to move along.
     """
+    out = Path(out)
     if out.suffix.lower() != ".mp4":
         raise InputError(f"{out}: expected a name that ends in .mp4")
     if not 1 <= frames_per_second <= 240:

@@ -257,7 +257,7 @@ void bind_envmap(nb::module_& m) {
       nb::sig("def load_envmap(path: str | os.PathLike[str], projection: str | None = None, "
               "faces: typing.Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', "
               "'files'] = 'automatic') -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]"),
-      "Layout, values and names of the channels of a map in an image or KTX2 file.");
+      "Layout, values and names of the channels of a map in an image, KTX2 or DDS file.");
   m.def(
       "load_panorama",
       [](const PathText& path, const std::string& layer, const std::string& part) {
@@ -290,7 +290,7 @@ void bind_envmap(nb::module_& m) {
       },
       nb::arg("path"), nb::arg("layout"), nb::arg("values"), nb::arg("channels"),
       nb::arg("faces") = FaceLayout::automatic, nb::arg("format") = PixelFormat::automatic,
-      "Write the finest level as an image, or all levels as KTX2.");
+      "Write the finest level as an image, or all levels as KTX2 or DDS.");
 
   nb::class_<Comparison> comparison(m, "Comparison", "How two maps differ, texels weighted by solid angle.");
   comparison.def_ro("max_error", &Comparison::max_error, "Largest difference.")

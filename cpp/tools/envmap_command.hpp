@@ -25,7 +25,7 @@ struct Input {
 
   void add_options(CLI::App& app, const std::string& name = "input") {
     app.add_option(name, path,
-                   "EXR, HDR, TIFF, PNG, JPEG or KTX2; {} in the name stands for px, nx, py, ny, pz, nz")
+                   "EXR, HDR, TIFF, PNG, JPEG, KTX2 or DDS; {} in the name stands for px, nx, py, ny, pz, nz")
         ->required();
   }
   void add_details(CLI::App& app, const std::string& whose = "the input") {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "envmap_command.hpp"
-#include "mirrorbake/envmap/ktx2.hpp"
+#include "mirrorbake/envmap/envmap_io.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
 #include "mirrorbake/prefilter/convolve.hpp"
 #include "mirrorbake/prefilter/harmonics.hpp"
@@ -158,9 +158,9 @@ class Prefilter final : public EnvmapCommand {
       std::cerr << "mb-envmap: level " << level + 1 << " of " << levels << '\n';
     };
     const std::size_t mark = output_.path.find("{}");
-    if (mark == std::string::npos && !is_ktx2(output_.path)) {
+    if (mark == std::string::npos && !stores_levels(output_.path)) {
       throw InvalidArgument("--output", output_.path,
-                            "a .ktx2 file, or an image path with {} for the number of the level");
+                            "a .ktx2 or .dds file, or an image path with {} for the number of the level");
     }
     const auto numbered = [&](int level) {
       Output one = output_;

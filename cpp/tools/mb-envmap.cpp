@@ -22,7 +22,6 @@
 #include "mirrorbake/envmap/compare.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
-#include "mirrorbake/envmap/ktx2.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/envmap/sampling.hpp"
@@ -87,16 +86,27 @@ struct Convert {
   std::vector<float> axis = {0.0F, 1.0F, 0.0F};
   float exposure = 0.0F;
 
+  CLI::Option* add_turn(CLI::App& app) {
+    app.add_option("--axis", axis, "x y z of the axis of --turn")->expected(3)->capture_default_str();
+    app.add_option("--exposure", exposure, "stops by which radiance is raised")->capture_default_str();
+    return app
+        .add_option("--turn", turn,
+                    "degrees to turn the surroundings about the axis: about +Y from -Z towards +X")
+        ->capture_default_str();
+  }
+
   void run(bool json) const {
-    const Projection target = parse_projection(projection);
-    output.check(target);
+    if (!projection.empty()) output.check(parse_projection(projection));
     const EnvMap source = input.load();
+    const Projection target = projection.empty() ? source.layout.projection : parse_projection(projection);
+    if (projection.empty()) output.check(target);
     // About as many texels as the source has.
     const double texels = static_cast<double>(source.layout.level_texels(0)) / face_count(target);
     const int natural =
         std::max(1, static_cast<int>(std::lround(std::sqrt(texels / natural_aspect(target)))));
-    const Size wanted =
-        size.empty() ? Size{natural * natural_aspect(target), natural} : parse_size(size, target);
+    const Size wanted = !size.empty()        ? parse_size(size, target)
+                        : projection.empty() ? Size{source.layout.width, source.layout.height}
+                                             : Size{natural * natural_aspect(target), natural};
     ResampleOptions options{parse_resample_filter(filter)};
     options.source_from_target = rotation();
     const bool same = target == source.layout.projection && wanted.width == source.layout.width &&
@@ -142,15 +152,15 @@ void print_comparison(const Comparison& c, bool json) {
 // Levels as KTX2, or as one image per level: {} in the path is the level's number then.
 void write_mips(const EnvMap& map, MipFilter filter, const Output& output, bool json) {
   const std::size_t mark = output.path.find("{}");
-  const bool one_file = mark == std::string::npos && is_ktx2(output.path);
+  const bool one_file = mark == std::string::npos && stores_levels(output.path);
   if (one_file) {
     output.check(map.layout.projection);
     output.save(build_mips(map, filter), json);
     return;
   }
-  if (mark == std::string::npos || is_ktx2(output.path)) {
+  if (mark == std::string::npos || stores_levels(output.path)) {
     throw InvalidArgument("--output", output.path,
-                          "a .ktx2 file, or an image path with {} for the number of the level");
+                          "a .ktx2 or .dds file, or an image path with {} for the number of the level");
   }
   const auto numbered = [&](int level) {
     Output one = output;
@@ -171,7 +181,7 @@ void write_mips(const EnvMap& map, MipFilter filter, const Output& output, bool 
 // The widened faces are no environment map any more; they are packed like one, by default one below the
 // other.
 void write_border(const EnvMap& map, int border, Output output, bool json) {
-  if (is_ktx2(output.path)) {
+  if (stores_levels(output.path)) {
     throw InvalidArgument("--output", output.path, "an image: faces with borders make no cube map");
   }
   if (output.layout == "automatic" && output.path.find("{}") == std::string::npos) output.layout = "column";
@@ -278,15 +288,15 @@ int run(int argc, char** argv) {
   convert_command
       ->add_option("--to-convention", convert.convention, "orientation to make, as for --from-convention")
       ->capture_default_str();
-  convert_command
-      ->add_option("--turn", convert.turn,
-                   "degrees to turn the surroundings about the axis: about +Y from -Z towards +X")
-      ->capture_default_str();
-  convert_command->add_option("--axis", convert.axis, "x y z of the axis of --turn")
-      ->expected(3)
-      ->capture_default_str();
-  convert_command->add_option("--exposure", convert.exposure, "stops by which radiance is raised")
-      ->capture_default_str();
+  convert.add_turn(*convert_command);
+
+  Convert rotate;
+  CLI::App* rotate_command =
+      app.add_subcommand("rotate", "The same projection and size, turned about any axis");
+  rotate.input.add_options(*rotate_command);
+  rotate.input.add_details(*rotate_command);
+  rotate.output.add_options(*rotate_command);
+  rotate.add_turn(*rotate_command)->required();
 
   Input mips_input;
   Output mips_output;
@@ -345,6 +355,7 @@ int run(int argc, char** argv) {
   set_exr_threads(thread_count());
   if (*info_command) print_info(info, json);
   if (*convert_command) convert.run(json);
+  if (*rotate_command) rotate.run(json);
   if (*mips_command) write_mips(mips_input.load(), parse_mip_filter(mip_filter), mips_output, json);
   if (*border_command) write_border(border_input.load(), border, border_output, json);
   if (*sample_command)

@@ -128,7 +128,7 @@ class EnvMap:
     def load(
         cls, path: str | PathLike[str], projection: str | None = None, *, faces: FaceLayout = "automatic"
     ) -> EnvMap:
-        """Read an EXR, HDR, TIFF, PNG, JPEG or KTX2.
+        """Read an EXR, HDR, TIFF, PNG, JPEG, KTX2 or DDS.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class EnvMap:
     def save(
         self, path: str | PathLike[str], *, faces: FaceLayout = "automatic", format: PixelFormat = "automatic"
     ) -> _core.SaveReport:
-        """Write the finest level as an image, or all levels as KTX2, atomically.
+        """Write the finest level as an image, or all levels as KTX2 or DDS, atomically.
 
         Parameters
         ----------

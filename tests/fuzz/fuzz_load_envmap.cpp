@@ -1,5 +1,5 @@
-// Bytes as an image or KTX2 file. The first byte chooses how it is read: the extension, then the arrangement
-// of faces and the projection.
+// Bytes as an image, KTX2 or DDS file. The first byte chooses how it is read: the extension, then the
+// arrangement of faces and the projection.
 #include <unistd.h>
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 int fuzz_load_envmap(const std::uint8_t* data, std::size_t size) {
   using namespace mirrorbake;  // NOLINT(google-build-using-namespace): one function
   if (size == 0) return 0;
-  const char* extensions[] = {".exr", ".hdr", ".tif", ".png", ".jpg", ".ktx2", ".ktx2", ".ktx2"};
+  const char* extensions[] = {".exr", ".hdr", ".tif", ".png", ".jpg", ".dds", ".ktx2", ".ktx2"};
   const FaceLayout layouts[] = {FaceLayout::automatic, FaceLayout::strip, FaceLayout::cross,
                                 FaceLayout::grid};
   const std::string path = (std::filesystem::temp_directory_path() /

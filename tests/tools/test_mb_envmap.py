@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from mirrorbake.envmap import EnvMap
+from mirrorbake.projection import texel_directions
 from programs import find_program, needs_program, run_program
 
 pytestmark = needs_program("mb-envmap")
@@ -309,3 +310,29 @@ def test_outputs_are_checked_before_the_input_is_read(tmp_path: Path) -> None:
     assert "a.doc" in message
     assert ".ktx2" in message
     assert "none.exr" not in message
+
+
+def test_rotate_keeps_projection_and_size_and_a_turn_back_restores(tmp_path: Path) -> None:
+    d = texel_directions("latlong", 64, 32)
+    EnvMap.from_array((2 + d).astype(np.float32), "latlong").save(tmp_path / "in.exr", format="float32")
+    axis = ("--axis", 1, 2, 3)
+    there, back = tmp_path / "there.exr", tmp_path / "back.exr"
+    mb_envmap("rotate", tmp_path / "in.exr", "--turn", 50, *axis, "--exposure", 1, "-o", there)
+    turned = EnvMap.load(there)
+    assert (turned.projection, turned.level().shape) == ("latlong", (32, 64, 3))
+    # What lies on the axis stays, twice as bright.
+    on_axis = np.array([1, 2, 3]) / 14**0.5
+    np.testing.assert_allclose(turned.sample(on_axis), 2 * (2 + on_axis), atol=0.02)
+    mb_envmap("rotate", there, "--turn", -50, *axis, "--exposure", -1, "-o", back)
+    # Texels are 0.1 rad wide; two interpolations move the light by less than a third of that.
+    np.testing.assert_allclose(EnvMap.load(back).values, (2 + d).ravel(), atol=0.03)
+
+
+def test_mips_go_through_dds(tmp_path: Path) -> None:
+    d = np.stack([texel_directions("cube", 16, 16, face) for face in range(6)])
+    source = EnvMap.from_array((2 + d).astype(np.float32), "cube")
+    source.save(tmp_path / "in.exr", format="float32")
+    mb_envmap("mips", tmp_path / "in.exr", "--format", "float32", "-o", tmp_path / "out.dds")
+    again = EnvMap.load(tmp_path / "out.dds")
+    assert again.levels == 5
+    np.testing.assert_array_equal(again.values, source.mips().values)

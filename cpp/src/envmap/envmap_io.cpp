@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/envmap/dds.hpp"
 #include "mirrorbake/envmap/ktx2.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 
@@ -220,9 +221,12 @@ EnvMap unpack_faces(const Image& image, const std::optional<Projection>& project
   return map;
 }
 
+bool stores_levels(const std::string& path) { return is_ktx2(path) || is_dds(path); }
+
 EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection, FaceLayout layout,
                    const ImageLimits& limits) {
   if (is_ktx2(path)) return load_ktx2(path, limits);
+  if (is_dds(path)) return load_dds(path, limits);
   if (names_faces(path)) {
     return load_faces(path, projection.value_or(Projection{ProjectionKind::cube}), limits);
   }
@@ -236,8 +240,8 @@ EnvMap load_envmap(const std::string& path, const std::optional<Projection>& pro
 
 Image load_panorama(const std::string& path, const ImageChoice& choice, const ImageLimits& limits) {
   EnvMap map;
-  if (is_ktx2(path)) {
-    map = load_ktx2(path, limits);
+  if (stores_levels(path)) {
+    map = is_dds(path) ? load_dds(path, limits) : load_ktx2(path, limits);
   } else {
     const Image image = colours_of(path, load_image(path, limits, choice));
     const std::optional<FaceLayout> cube = recognised_cube(image);
@@ -266,17 +270,22 @@ Image load_panorama(const std::string& path, const ImageChoice& choice, const Im
 void check_envmap_path(const std::string& path, const Projection& projection, FaceLayout layout,
                        PixelFormat format) {
   const int faces = face_count(projection);
-  if (is_ktx2(path)) {
-    check_ktx2_path(path, projection, format);
+  if (stores_levels(path)) {
+    if (is_dds(path)) {
+      check_dds_path(path, projection, format);
+    } else {
+      check_ktx2_path(path, projection, format);
+    }
     if (layout != FaceLayout::automatic) {
-      throw InvalidArgument("layout", to_string(layout), "automatic: a KTX2 file has a layout of its own");
+      throw InvalidArgument("layout", to_string(layout),
+                            "automatic: a KTX2 or DDS file has a layout of its own");
     }
     return;
   }
   if (!path.empty() && !has_image_extension(path)) {
     throw FileError(path,
                     "has an unknown extension, expected .exr, .hdr, .tif, .tiff, .png, .jpg, .jpeg, or .ktx2 "
-                    "for a cube map");
+                    "or .dds for a cube map");
   }
   const bool several = names_faces(path);
   check_image_path(several && faces > 1 ? face_path(path, projection, 0) : path, format);
@@ -297,6 +306,7 @@ SaveReport save_envmap(const std::string& path, const EnvMapView& map, FaceLayou
   const Projection& projection = map.layout.projection;
   check_envmap_path(path, projection, layout, format);
   if (is_ktx2(path)) return save_ktx2(path, map, format);
+  if (is_dds(path)) return save_dds(path, map, format);
   if (!names_faces(path)) return save_image(path, pack_faces(map, 0, layout), format);
   std::vector<std::string> names(map.channels.begin(), map.channels.end());
   if (names.empty()) names = default_channels(map.layout.channels);

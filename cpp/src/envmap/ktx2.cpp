@@ -2,19 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cctype>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <numeric>
-#include <optional>
 #include <string_view>
 #include <vector>
 
+#include "cube_file.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/version.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
@@ -22,8 +16,6 @@
 
 namespace mirrorbake {
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "KTX2 is little-endian and so is this code");
 
 constexpr std::array<std::uint8_t, 12> kIdentifier = {0xab, 'K',  'T',  'X',  ' ',  '2',
                                                       '0',  0xbb, '\r', '\n', 0x1a, '\n'};
@@ -46,26 +38,6 @@ constexpr std::array<Format, 8> kFormats = {{
     {106, 3, 4},
     {109, 4, 4},
 }};
-
-class ByteWriter {
- public:
-  template <typename T>
-  void put(T value) {
-    const auto raw = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
-    bytes.insert(bytes.end(), raw.begin(), raw.end());
-  }
-  void put_text(std::string_view text) {
-    for (const char c : text) bytes.push_back(static_cast<std::byte>(c));
-  }
-  void pad(std::size_t alignment) {
-    while (bytes.size() % alignment != 0) bytes.push_back(std::byte{0});
-  }
-  template <typename T>
-  void overwrite(std::size_t offset, T value) {
-    std::memcpy(bytes.data() + offset, &value, sizeof value);
-  }
-  std::vector<std::byte> bytes;
-};
 
 // Basic descriptor block of the Khronos Data Format Specification 1.3: linear BT.709 RGBA, signed floats.
 void put_data_format(ByteWriter& out, int channels, std::size_t bytes) {
@@ -96,44 +68,11 @@ void put_key(ByteWriter& out, std::string_view key, std::string_view value) {
   out.pad(4);
 }
 
-class Reader {
- public:
-  Reader(const std::string& path, const ImageLimits& limits)
-      : path_(path), in_(path, std::ios::binary | std::ios::ate) {
-    std::error_code error;
-    if (!std::filesystem::exists(path, error)) throw FileError(path, "does not exist");
-    if (!std::filesystem::is_regular_file(path, error) || !in_) throw FileError(path, "cannot be read");
-    size_ = static_cast<std::uint64_t>(in_.tellg());
-    if (size_ > limits.max_bytes) throw FileError(path, "is too large");
-  }
-
-  void require(std::uint64_t offset, std::uint64_t bytes) const {
-    if (offset > size_ || bytes > size_ - offset) throw FileError(path_, "is truncated");
-  }
-  void read(std::uint64_t offset, void* data, std::uint64_t bytes) {
-    require(offset, bytes);
-    in_.seekg(static_cast<std::streamoff>(offset));
-    in_.read(static_cast<char*>(data), static_cast<std::streamsize>(bytes));
-    if (!in_) throw FileError(path_, "cannot be read");
-  }
-  template <typename T>
-  T get(std::uint64_t offset) {
-    T value;
-    read(offset, &value, sizeof value);
-    return value;
-  }
-
- private:
-  std::string path_;
-  std::ifstream in_;
-  std::uint64_t size_ = 0;
-};
-
 constexpr std::string_view kSwizzleKey = "KTXswizzle";
 constexpr std::string_view kOpaque = "rgb1";
 
 // Whether the file's key/value data say that alpha is to be read as 1.
-bool is_opaque(Reader& in, const std::string& path) {
+bool is_opaque(FileBytes& in, const std::string& path) {
   std::uint64_t place = in.get<std::uint32_t>(56);
   const std::uint64_t end = place + in.get<std::uint32_t>(60);
   in.require(place, end - place);
@@ -153,24 +92,9 @@ bool is_opaque(Reader& in, const std::string& path) {
   return false;
 }
 
-EnvMap without_alpha(const EnvMap& map) {
-  EnvMapLayout layout = map.layout;
-  layout.channels = 3;
-  EnvMap result = make_envmap(layout, default_channels(3));
-  for (std::size_t from = 0, to = 0; from < map.values.size(); from += 4, to += 3) {
-    std::copy_n(&map.values[from], 3, &result.values[to]);
-  }
-  return result;
-}
-
 }  // namespace
 
-bool is_ktx2(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".ktx2";
-}
+bool is_ktx2(const std::string& path) { return has_extension(path, ".ktx2"); }
 
 void check_ktx2_path(const std::string& path, const Projection& projection, PixelFormat format) {
   if (projection.kind != ProjectionKind::cube) {
@@ -244,7 +168,7 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map, PixelFormat
 }
 
 EnvMap load_ktx2(const std::string& path, const ImageLimits& limits) {
-  Reader in(path, limits);
+  FileBytes in(path, limits);
   std::array<std::uint8_t, 12> identifier{};
   in.read(0, identifier.data(), identifier.size());
   if (identifier != kIdentifier) throw FileError(path, "is not a KTX2 file");

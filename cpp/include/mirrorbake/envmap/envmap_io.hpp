@@ -60,4 +60,7 @@ SaveReport save_envmap(const std::string& path, const EnvMapView& map,
                        FaceLayout layout = FaceLayout::automatic,
                        PixelFormat format = PixelFormat::automatic);
 
+/// Whether the extension is that of files of cubes with all their levels: .ktx2, .dds.
+bool stores_levels(const std::string& path);
+
 }  // namespace mirrorbake

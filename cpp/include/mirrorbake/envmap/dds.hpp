@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+
+#include "mirrorbake/envmap/envmap.hpp"
+#include "mirrorbake/image/image_io.hpp"
+
+/// DDS files (Microsoft, "Programming Guide for DDS") of cube maps with their levels. Direct3D's faces have
+/// the order and orientation of OpenGL's.
+namespace mirrorbake {
+
+/// Whether the extension is .dds, in capitals or not.
+bool is_dds(const std::string& path);
+
+/// Writes a cube map with a DX10 header as float16 (`automatic`, `half`) or float32, atomically: one channel
+/// as R, two as RG, three and four as RGBA; of three channels the header says that alpha is opaque. Values
+/// beyond ±65504 are clamped to float16 and counted. Throws InvalidArgument if the map is not a cube of one
+/// to four channels, FileError if the file cannot be written or `format` is another.
+SaveReport save_dds(const std::string& path, const EnvMapView& map,
+                    PixelFormat format = PixelFormat::automatic);
+
+/// What save_dds would refuse whatever the map's values are, by the same errors. Nothing is written.
+void check_dds_path(const std::string& path, const Projection& projection,
+                    PixelFormat format = PixelFormat::automatic);
+
+/// Reads a cube map of float16 or float32 with one to four channels and any number of levels, with a DX10
+/// header or the older codes of such pixels (as cmft writes). An alpha that is opaque is left out. Throws
+/// FileError for anything else (such as the compressed BC6H), damaged files and those beyond `limits`.
+EnvMap load_dds(const std::string& path, const ImageLimits& limits = {});
+
+}  // namespace mirrorbake

@@ -1,0 +1,188 @@
+#include "mirrorbake/envmap/dds.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "cube_file.hpp"
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/image/atomic_file.hpp"
+#include "mirrorbake/image/half.hpp"
+
+namespace mirrorbake {
+namespace {
+
+constexpr std::uint32_t four(const char (&text)[5]) {
+  std::uint32_t code = 0;
+  for (int i = 3; i >= 0; --i) code = code << 8U | static_cast<std::uint8_t>(text[i]);
+  return code;
+}
+
+constexpr std::uint32_t kMagic = four("DDS ");
+constexpr std::uint32_t kDx10 = four("DX10");
+constexpr std::uint64_t kHeaderBytes = 128;  // with the magic
+constexpr std::uint64_t kDx10Bytes = 20;
+
+// DDSD_CAPS | HEIGHT | WIDTH | PITCH | PIXELFORMAT, and MIPMAPCOUNT.
+constexpr std::uint32_t kFlags = 0x1 | 0x2 | 0x4 | 0x8 | 0x1000;
+constexpr std::uint32_t kFlagLevels = 0x20000;
+constexpr std::uint32_t kFourCc = 0x4;                               // DDPF_FOURCC
+constexpr std::uint32_t kCaps = 0x1000 | 0x8;                        // TEXTURE | COMPLEX
+constexpr std::uint32_t kCapsLevels = 0x400000;                      // MIPMAP
+constexpr std::uint32_t kCube = 0x200;                               // DDSCAPS2_CUBEMAP
+constexpr std::uint32_t kAllFaces = 0xfc00;                          // all six DDSCAPS2_CUBEMAP_…
+constexpr std::uint32_t kTexture2d = 3, kMiscCube = 4, kOpaque = 3;  // of the DX10 header
+
+// DXGI_FORMAT_R16_FLOAT and so on; `code` is the D3DFMT number that older writers put into the FourCC.
+struct Format {
+  std::uint32_t dxgi;
+  std::uint32_t code;
+  int channels;
+  std::size_t bytes;  // of a channel
+};
+constexpr std::array<Format, 7> kFormats = {{
+    {54, 111, 1, 2},
+    {34, 112, 2, 2},
+    {10, 113, 4, 2},
+    {41, 114, 1, 4},
+    {16, 115, 2, 4},
+    {6, 0, 3, 4},
+    {2, 116, 4, 4},
+}};
+
+// Calls visit(level, face) in the order of the file: all levels of a face, one face after the other.
+template <typename Visit>
+void for_each_image(const EnvMapLayout& layout, Visit&& visit) {
+  for (int face = 0; face < 6; ++face) {
+    for (int level = 0; level < layout.levels; ++level) visit(level, face);
+  }
+}
+
+std::size_t values_of_face(const EnvMapLayout& layout, int level) {
+  return (layout.level_offset(level + 1) - layout.level_offset(level)) / 6;
+}
+
+}  // namespace
+
+bool is_dds(const std::string& path) { return has_extension(path, ".dds"); }
+
+void check_dds_path(const std::string& path, const Projection& projection, PixelFormat format) {
+  if (projection.kind != ProjectionKind::cube) {
+    throw InvalidArgument("map", to_string(projection), "a cube map: DDS is written of no other projection");
+  }
+  if (format == PixelFormat::uint8 || format == PixelFormat::uint16) {
+    throw FileError(path, "its format cannot store these pixels, expected half or float32");
+  }
+  const AtomicFile checks_the_folder(path);
+}
+
+SaveReport save_dds(const std::string& path, const EnvMapView& map, PixelFormat pixels) {
+  validate(map);
+  check_dds_path(path, map.layout.projection, pixels);
+  const EnvMapLayout& layout = map.layout;
+  if (layout.channels > 4) {
+    throw InvalidArgument("channels", std::to_string(layout.channels), "1 to 4 in a DDS file");
+  }
+  const bool whole = pixels == PixelFormat::float32;
+  const int stored = layout.channels == 3 ? 4 : layout.channels;
+  const Format& format = *std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& f) {
+    return f.channels == stored && f.bytes == (whole ? 4U : 2U);
+  });
+  const bool levels = layout.levels > 1;
+  const auto side = static_cast<std::uint32_t>(layout.width);
+  ByteWriter out;
+  const auto put = [&](std::initializer_list<std::uint32_t> values) {
+    for (const std::uint32_t value : values) out.put(value);
+  };
+  put({kMagic, 124, kFlags | (levels ? kFlagLevels : 0U), side, side});
+  put({side * static_cast<std::uint32_t>(format.bytes) * static_cast<std::uint32_t>(stored), 0,
+       static_cast<std::uint32_t>(layout.levels)});
+  for (int i = 0; i < 11; ++i) put({0});
+  put({32, kFourCc, kDx10, 0, 0, 0, 0, 0});
+  put({kCaps | (levels ? kCapsLevels : 0U), kCube | kAllFaces, 0, 0, 0});
+  put({format.dxgi, kTexture2d, kMiscCube, 1, layout.channels == 3 ? kOpaque : 0U});
+
+  SaveReport report;
+  const std::size_t channels = static_cast<std::size_t>(layout.channels);
+  for_each_image(layout, [&](int level, int face) {
+    const std::size_t count = values_of_face(layout, level);
+    const std::span<const float> values =
+        map.level(level).subspan(static_cast<std::size_t>(face) * count, count);
+    for (std::size_t i = 0; i < count; i += channels) {
+      for (std::size_t c = 0; c < static_cast<std::size_t>(stored); ++c) {
+        const float v = c < channels ? values[i + c] : 1.0F;
+        if (whole) {
+          out.put(v);
+        } else {
+          out.put(half_from_float(clamp_to_half(v, report.clamped_to_half)));
+        }
+      }
+    }
+  });
+  write_file(path, out.bytes);
+  return report;
+}
+
+EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
+  FileBytes in(path, limits);
+  if (in.get<std::uint32_t>(0) != kMagic || in.get<std::uint32_t>(4) != 124 ||
+      in.get<std::uint32_t>(76) != 32) {
+    throw FileError(path, "is not a DDS file");
+  }
+  const bool has_code = (in.get<std::uint32_t>(80) & kFourCc) != 0;
+  const auto code = in.get<std::uint32_t>(84);
+  const bool dx10 = has_code && code == kDx10;
+  const auto dxgi = dx10 ? in.get<std::uint32_t>(kHeaderBytes) : 0U;
+  const auto format = std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& f) {
+    return dx10 ? f.dxgi == dxgi : has_code && f.code != 0 && f.code == code;
+  });
+  if (format == kFormats.end()) {
+    const std::string found = dx10       ? "the DXGI format " + std::to_string(dxgi)
+                              : has_code ? "the format code " + std::to_string(code)
+                                         : "pixels of integers";
+    throw FileError(path, "has " + found + ", expected float16 or float32 of one to four channels");
+  }
+  const bool cube = dx10 ? in.get<std::uint32_t>(kHeaderBytes + 4) == kTexture2d &&
+                               (in.get<std::uint32_t>(kHeaderBytes + 8) & kMiscCube) != 0 &&
+                               in.get<std::uint32_t>(kHeaderBytes + 12) == 1
+                         : (in.get<std::uint32_t>(112) & (kCube | kAllFaces)) == (kCube | kAllFaces);
+  if (!cube) throw FileError(path, "is not a single cube map of six faces");
+  const auto height = in.get<std::uint32_t>(12);
+  const auto width = in.get<std::uint32_t>(16);
+  const auto most = static_cast<std::uint32_t>(std::min(limits.max_side, 65536));
+  if (width < 1 || width > most || width != height) {
+    throw FileError(path, "has faces of " + std::to_string(width) + " x " + std::to_string(height) +
+                              " texels, expected square ones of 1 to " + std::to_string(most));
+  }
+  const int side = static_cast<int>(width);
+  const auto levels = std::max(in.get<std::uint32_t>(28), 1U);
+  if (levels > static_cast<std::uint32_t>(full_level_count(side, side))) {
+    throw FileError(path, "has " + std::to_string(levels) + " levels, more than its size allows");
+  }
+  const EnvMapLayout layout{{ProjectionKind::cube}, side, side, static_cast<int>(levels), format->channels};
+  if (layout.size() > limits.max_bytes / sizeof(float)) throw FileError(path, "is too large");
+  // Whether the file holds what its header promises is known before memory is taken for it.
+  std::uint64_t place = kHeaderBytes + (dx10 ? kDx10Bytes : 0);
+  in.require(place, layout.size() * static_cast<std::uint64_t>(format->bytes));
+  const bool opaque =
+      dx10 && format->channels == 4 && (in.get<std::uint32_t>(kHeaderBytes + 16) & 7U) == kOpaque;
+  EnvMap map = make_envmap(layout, default_channels(format->channels));
+  std::vector<std::uint16_t> halves;
+  for_each_image(layout, [&](int level, int face) {
+    const std::size_t count = values_of_face(layout, level);
+    float* values = map.values.data() + layout.level_offset(level) + static_cast<std::size_t>(face) * count;
+    if (format->bytes == sizeof(float)) {
+      in.read(place, values, count * sizeof(float));
+    } else {
+      halves.resize(count);
+      in.read(place, halves.data(), count * sizeof(std::uint16_t));
+      std::transform(halves.begin(), halves.end(), values, float_from_half);
+    }
+    place += count * format->bytes;
+  });
+  return opaque ? without_alpha(map) : map;
+}
+
+}  // namespace mirrorbake

@@ -1,0 +1,170 @@
+#include "mirrorbake/envmap/dds.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/sampling.hpp"
+#include "mirrorbake/envmap/envmap_io.hpp"
+#include "mirrorbake/envmap/mipmap.hpp"
+#include "mirrorbake/image/atomic_file.hpp"
+#include "mirrorbake/image/half.hpp"
+
+namespace mirrorbake {
+namespace {
+
+class Dds : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / ("mirrorbake_dds_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::vector<std::byte> bytes_of(const std::string& name) const {
+    std::ifstream in(path(name), std::ios::binary);
+    const std::vector<char> text((std::istreambuf_iterator<char>(in)), {});
+    std::vector<std::byte> bytes(text.size());
+    std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
+    return bytes;
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+EnvMap noise(int side, int channels) {
+  EnvMap map = make_envmap({parse_projection("cube"), side, side, 1, channels});
+  for (std::size_t i = 0; i < map.values.size(); ++i) {
+    map.values[i] = static_cast<float>(hash64(i) % 10000) * 0.01F;
+  }
+  return map;
+}
+
+std::uint32_t word(const std::vector<std::byte>& bytes, std::size_t offset) {
+  std::uint32_t value = 0;
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
+
+void set_word(std::vector<std::byte>& bytes, std::size_t offset, std::uint32_t value) {
+  std::memcpy(bytes.data() + offset, &value, sizeof value);
+}
+
+TEST_F(Dds, ReturnsEveryLevelInTheFormatAskedFor) {
+  for (int channels = 1; channels <= 4; ++channels) {
+    for (const PixelFormat format : {PixelFormat::automatic, PixelFormat::half, PixelFormat::float32}) {
+      const EnvMap mips = build_mips(noise(20, channels), MipFilter::seamless);
+      EXPECT_EQ(save_envmap(path("a.DDS"), mips, FaceLayout::automatic, format).clamped_to_half, 0u);
+      const EnvMap again = load_envmap(path("a.DDS"));
+      ASSERT_EQ(again.layout, mips.layout);
+      for (std::size_t i = 0; i < mips.values.size(); ++i) {
+        const float exact = mips.values[i];
+        ASSERT_EQ(again.values[i],
+                  format == PixelFormat::float32 ? exact : float_from_half(half_from_float(exact)));
+      }
+    }
+  }
+}
+
+// Offsets and numbers as the Programming Guide for DDS has them.
+TEST_F(Dds, HeaderIsThatOfACubeOfHalfFloats) {
+  save_dds(path("a.dds"), build_mips(noise(4, 3), MipFilter::box));
+  const std::vector<std::byte> bytes = bytes_of("a.dds");
+  EXPECT_EQ(bytes.size(), 148u + 6u * (16u + 4u + 1u) * 8u);
+  EXPECT_EQ(word(bytes, 0), 0x20534444u);  // "DDS "
+  EXPECT_EQ(word(bytes, 4), 124u);
+  EXPECT_EQ(word(bytes, 12), 4u);  // height, width
+  EXPECT_EQ(word(bytes, 16), 4u);
+  EXPECT_EQ(word(bytes, 28), 3u);            // levels
+  EXPECT_EQ(word(bytes, 76), 32u);           // size of the pixel format
+  EXPECT_EQ(word(bytes, 84), 0x30315844u);   // "DX10"
+  EXPECT_EQ(word(bytes, 108), 0x00401008u);  // texture, complex, mipmap
+  EXPECT_EQ(word(bytes, 112), 0x0000fe00u);  // cube of all faces
+  EXPECT_EQ(word(bytes, 128), 10u);          // DXGI_FORMAT_R16G16B16A16_FLOAT
+  EXPECT_EQ(word(bytes, 132), 3u);           // two dimensions
+  EXPECT_EQ(word(bytes, 136), 4u);           // cube
+  EXPECT_EQ(word(bytes, 140), 1u);           // one of them
+  EXPECT_EQ(word(bytes, 144), 3u);           // opaque
+}
+
+// All levels of a face lie together, unlike in KTX2.
+TEST_F(Dds, LevelsOfAFaceFollowEachOther) {
+  EnvMap mips = build_mips(noise(2, 1), MipFilter::box);
+  save_dds(path("a.dds"), mips, PixelFormat::float32);
+  const std::vector<std::byte> bytes = bytes_of("a.dds");
+  for (std::size_t face = 0; face < 6; ++face) {
+    float stored[5];
+    std::memcpy(stored, bytes.data() + 148 + face * sizeof stored, sizeof stored);
+    for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(stored[i], mips.values[4 * face + i]);
+    EXPECT_EQ(stored[4], mips.values[24 + face]);
+  }
+}
+
+TEST_F(Dds, OlderHeadersAreReadAndOtherPixelsAreNamed) {
+  const EnvMap map = noise(4, 4);
+  save_dds(path("a.dds"), map, PixelFormat::float32);
+  std::vector<std::byte> old = bytes_of("a.dds");
+  old.erase(old.begin() + 128, old.begin() + 148);
+  set_word(old, 84, 116);  // D3DFMT_A32B32G32R32F
+  write_file(path("old.dds"), old);
+  EXPECT_EQ(load_envmap(path("old.dds")).values, map.values);
+
+  std::vector<std::byte> compressed = bytes_of("a.dds");
+  set_word(compressed, 128, 95);  // DXGI_FORMAT_BC6H_UF16
+  write_file(path("bc6h.dds"), compressed);
+  try {
+    load_dds(path("bc6h.dds"));
+    ADD_FAILURE() << "BC6H was read";
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("DXGI format 95"));
+  }
+}
+
+TEST_F(Dds, ClampsAndCountsAndStoresNothingButCubes) {
+  EnvMap map = make_envmap({parse_projection("cube"), 1, 1, 1, 1});
+  map.values = {1e6F, -1e6F, std::numeric_limits<float>::infinity(), 65504.0F, 0.0F, 1.0F};
+  EXPECT_EQ(save_dds(path("a.dds"), map).clamped_to_half, 3u);
+  const EnvMap panorama = make_envmap({parse_projection("latlong"), 4, 2, 1, 3});
+  EXPECT_THROW(save_dds(path("b.dds"), panorama), InvalidArgument);
+  EXPECT_THROW(save_dds(path("b.dds"), map, PixelFormat::uint8), FileError);
+  EXPECT_THROW(save_envmap(path("b.dds"), map, FaceLayout::cross), InvalidArgument);
+}
+
+TEST_F(Dds, DamagedFilesAreErrorsAndNeverCrash) {
+  save_dds(path("whole.dds"), build_mips(noise(8, 3), MipFilter::box));
+  const std::vector<std::byte> bytes = bytes_of("whole.dds");
+  for (std::size_t length = 0; length < bytes.size(); length += 37) {
+    write_file(path("broken.dds"), std::span(bytes).first(length));
+    EXPECT_THROW(load_envmap(path("broken.dds")), FileError) << length;
+  }
+  int loaded = 0;
+  for (std::uint64_t trial = 0; trial < 500; ++trial) {
+    std::vector<std::byte> changed = bytes;
+    for (std::uint64_t i = 0; i < 1 + trial % 3; ++i) {
+      changed[hash64(trial, 2 * i) % 148] = static_cast<std::byte>(hash64(trial, 2 * i + 1) & 255u);
+    }
+    write_file(path("broken.dds"), changed);
+    try {
+      const EnvMap map = load_dds(path("broken.dds"), {.max_bytes = 1 << 24});
+      EXPECT_EQ(map.values.size(), map.layout.size());
+      ++loaded;
+    } catch (const FileError&) {
+    }
+  }
+  EXPECT_GT(loaded, 0);
+  EXPECT_LT(loaded, 500);
+}
+
+}  // namespace
+}  // namespace mirrorbake

@@ -79,6 +79,10 @@ def check_display(exposure: float, tone: str) -> None:
 
 def srgb_bytes(linear: FloatArray) -> NDArray[np.uint8]:
     """Linear values to sRGB in 8 bits (IEC 61966-2-1); clips to [0, 1]."""
-    x = np.clip(linear, 0.0, 1.0)
-    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1.0 / 2.4) - 0.055)
-    return np.rint(encoded * 255.0).astype(np.uint8)
+    return np.rint(srgb_encoded(linear) * 255.0).astype(np.uint8)
+
+
+def srgb_encoded(linear: FloatArray) -> NDArray[np.float64]:
+    """Linear values as sRGB in [0, 1] (IEC 61966-2-1); clips to [0, 1]."""
+    x = np.clip(np.asarray(linear, np.float64), 0.0, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1.0 / 2.4) - 0.055)

@@ -34,6 +34,7 @@ SMALL = {
     "views": {"count": 3, "degrees": 2.0, "start": 22.0, "size": [160, 120]},
     "maps": {"size": 64},
     "trace": {"samples": 8, "indirect": "none"},
+    "auto": {"quality": "draft"},
 }
 
 
@@ -230,6 +231,7 @@ def small_panorama_scene(tmp_path: Path, **sections: Any) -> dict[str, Any]:
         "surroundings": {"panorama": str(make_sky(tmp_path))},
         "views": {"count": 2, "degrees": 1.0, "size": [96, 72]},
         "trace": {"samples": 4, "indirect": "none"},
+        "auto": {"quality": "draft"},
         **sections,
     }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import signal
 import subprocess
@@ -16,7 +17,9 @@ from mirrorbake import _core
 from mirrorbake.bake.bake import bake
 from mirrorbake.errors import InputError, OptionError, StoreError
 from mirrorbake.evaluate.metrics import psnr
-from mirrorbake.pem.opened import open_pem
+from mirrorbake.pem.export.map_sets import sample_set, static_set
+from mirrorbake.pem.export.source import export_source
+from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.render import render
 from mirrorbake.pem.store import PemStore
 from mirrorbake.pem.verify import verify
@@ -34,6 +37,7 @@ TINY: dict[str, Any] = {
     "reflector": {"object": "teapot", "subdivisions": 8},
     "maps": {"size": 32, "distant": "infinite"},
     "trace": {"samples": 4, "depth": 2, "indirect": "none"},
+    "auto": {"quality": "draft"},
     "layers": {"local": True, "hull_split": True},
 }
 DOME = {"kind": "dome", "start": 20, "degrees": 20, "count": 2, "rings": 2, "elevation": [15, 35]}
@@ -50,9 +54,8 @@ def sky(folder: Path) -> str:
 
 def scene(folder: Path, views: dict[str, Any], **sections: Any) -> SceneConfig:
     sizes = {"size": [64, 48], **views}
-    return parse_config(
-        {**TINY, "surroundings": {"panorama": sky(folder)}, "views": sizes, **sections}, "scene"
-    )
+    light = {} if "surroundings" in sections else {"surroundings": {"panorama": sky(folder)}}
+    return parse_config({**TINY, **light, "views": sizes, **sections}, "scene")
 
 
 def objects(directory: Path) -> dict[str, bytes]:
@@ -244,9 +247,128 @@ def test_maps_fitted_to_the_display_draw_better_pixels_than_layers_fitted_apart(
     render(tmp_path / "display", (0.0,), tmp_path / "display.png")
 
 
-def test_a_fit_to_the_display_needs_both_shells(tmp_path: Path) -> None:
+# Whatever a scene leaves out: what the object reflects of itself, what is diffuse, a map for each part.
+SCENES: dict[str, dict[str, Any]] = {
+    "no local layer": {"layers": {"local": False, "hull_split": False}},
+    "diffuse under a coat": {
+        "material": {"ior": 1.5, "albedo": 0.4, "layers": "coated"},
+        "surroundings": {"room": "furnished"},
+        "maps": {"size": 32},
+    },
+    "on a ground": {"ground": True, "maps": {"size": 32}},
+    "paraboloids": {"maps": {"size": 32, "distant": "infinite", "projection": "paraboloid"}},
+    "a distant map for all": {"maps": {"size": 32, "distant": "infinite", "shared_distant": True}},
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_maps_are_fitted_to_the_display_in_every_kind_of_scene(name: str, tmp_path: Path) -> None:
+    sections = copy.deepcopy(SCENES[name])
+    if sections.pop("ground", False):
+        sections["surroundings"] = {"panorama": sky(tmp_path), "ground": {"radius": 0.3, "albedo": 0.4}}
+    config = scene(tmp_path, {"count": 1, "start": 20}, **sections)
+    assert config.infer.fit == "display"
+    bake(config, tmp_path / "pem")
+    pem = open_pem(tmp_path / "pem")
+    samples = pem.stage.visibility((0.0,), pem.run_time.places)
+    images = pem.store.read_images(0)
+    drawn = {
+        contender: psnr(
+            pem.run_time.render(contender, (0.0,), samples), images.object, images.coverage >= 0.99
+        )
+        for contender in ("pem", "static_infinite")
+    }
+    # The captured map has 8 to 20 dB here.
+    assert drawn["pem"] > drawn["static_infinite"] + 5.0
+    assert drawn["pem"] > 24.0
+    header = pem.store.header
+    assert header.faces == (2 if name == "paraboloids" else 6)
+    assert len(header.maps) == {"no local layer": 2, "a distant map for all": 3}.get(name, 4)
+    assert verify(tmp_path / "pem").is_sound
+
+
+def test_exports_refuse_maps_that_are_no_cubes_by_the_name_of_the_key(tmp_path: Path) -> None:
     config = scene(
-        tmp_path, {"count": 1}, infer={"fit": "display"}, layers={"local": False, "hull_split": False}
+        tmp_path,
+        {"count": 1},
+        maps={"size": 8, "distant": "infinite", "projection": "paraboloid"},
     )
-    with pytest.raises(InputError, match=r"set layers\.local = true"):
-        bake(config, tmp_path / "pem")
+    bake(config, tmp_path / "pem")
+    pem = open_pem(tmp_path / "pem")
+    for export in (
+        lambda: export_source(pem),
+        lambda: static_set(pem.store),
+        lambda: sample_set(pem.store, 0),
+    ):
+        with pytest.raises(InputError, match=r'maps\.projection = "paraboloid"'):
+            export()
+
+
+NEAR = {"count": 3, "degrees": 4.0, "start": 20}
+"""Neighbours' views are fitted by a map itself, up to 3 degrees."""
+FAR = {"count": 3, "degrees": 24.0, "start": 8}
+"""Views between are fitted by the blend of maps."""
+
+
+@pytest.mark.parametrize("views", [NEAR, FAR], ids=["near", "far"])
+def test_samples_that_see_their_neighbours_are_the_same_in_any_order(
+    views: dict[str, Any], tmp_path: Path
+) -> None:
+    config = scene(tmp_path, views, auto={"quality": "normal"}, static={"views": 3})
+    bake(config, tmp_path / "whole")
+    plan = PemStore.open(tmp_path / "whole").header.plan
+    assert (plan.value("infer.neighbours"), plan.value("views.traced")) == (
+        (0.3, 0) if views is NEAR else (0.0, 1)
+    )
+    whole = objects(tmp_path / "whole")
+    with _core.ThreadLimit(1):
+        for piece in ([2], [0], [1]):
+            bake(config, tmp_path / "pieces", samples=piece)
+    assert objects(tmp_path / "pieces") == whole
+
+
+def decibels_at(pem: OpenedPem, contender: str, raised: float) -> float:
+    """PSNR from so many degrees above the middle of an arc, against 64 samples per pixel."""
+    cameras = pem.stage.built.cameras
+    azimuth, elevation = cameras.angles_of(cameras.eye((0.5,)))
+    camera = cameras.around(azimuth, elevation + raised)
+    reflector, options = pem.stage.built.reflector, pem.stage.options
+    options.noise, options.samples_per_pixel, options.seed = 0.0, 64, 99
+    images = images_of_trace(pem.stage.tracer.trace_layers(camera, reflector, options))
+    samples = pem.stage.tracer.trace_visibility(camera, reflector, options, pem.run_time.places)
+    away = cameras.degrees_outside(camera.eye)
+    drawn = pem.run_time.render(contender, (0.5,), samples, None, away)
+    return psnr(drawn, images.object, images.coverage >= 0.99)
+
+
+def test_a_pem_fades_to_its_static_set_with_the_distance_from_its_samples(tmp_path: Path) -> None:
+    config = scene(tmp_path, NEAR, static={"views": 12, "elevation": [10, 60]})
+    bake(config, tmp_path / "pem")
+    pem = open_pem(tmp_path / "pem")
+    assert pem.store.header.static["fade"]["degrees"] < 45.0
+    on = {name: decibels_at(pem, name, 0.0) for name in ("pem", "static_set", "static_infinite")}
+    assert on["pem"] > on["static_set"] + 1.0
+    far = {name: decibels_at(pem, name, 25.0) for name in ("pem", "static_set", "static_infinite")}
+    # The fade is fitted to a handful of views of 64 x 48 pixels.
+    assert far["pem"] > far["static_set"] - 0.5
+    assert far["static_set"] > far["static_infinite"]
+    render(tmp_path / "pem", (0.5,), tmp_path / "beyond.png", (3.0, 20.0))
+    with pytest.raises(InputError, match="the eye would pass straight above"):
+        render(tmp_path / "pem", (0.5,), tmp_path / "beyond.png", (0.0, 80.0))
+
+
+def test_a_static_set_alone_has_no_parameters(tmp_path: Path) -> None:
+    views = {"kind": "none", "start": -20, "degrees": 60, "count": 12, "elevation": [10, 50]}
+    config = scene(tmp_path, views)
+    bake(config, tmp_path / "pem")
+    pem = open_pem(tmp_path / "pem")
+    assert len(pem.space) == 1
+    assert pem.space.sample(0) == ()
+    samples = pem.stage.visibility((), pem.run_time.places)
+    images = pem.store.read_images(0)
+    drawn = {
+        name: psnr(pem.run_time.render(name, (), samples), images.object, images.coverage >= 0.99)
+        for name in ("pem", "static_infinite")
+    }
+    # The view that a PEM keeps lies in the middle of the dome and is none of those that it is inferred from.
+    assert drawn["pem"] > drawn["static_infinite"] + 3.0

@@ -46,6 +46,7 @@ SMALL = {
     "views": {"count": 3, "degrees": 2.0, "start": 22.0, "size": [96, 72]},
     "maps": {"size": 32},
     "trace": {"samples": 8, "depth": 4, "indirect": "none"},
+    "auto": {"quality": "draft"},
 }
 
 

@@ -36,6 +36,7 @@ SMALL = {
     "maps": {"size": SIZE},
     "layers": {"diffuse": True, "local": True, "hull_split": True},
     "trace": {"samples": 2, "indirect": "none"},
+    "auto": {"quality": "draft"},
 }
 
 

@@ -26,6 +26,7 @@ SMALL = {
     "views": {"count": 3, "degrees": 30.0, "size": [63, 48]},
     "maps": {"size": 16},
     "trace": {"samples": 2, "indirect": "none"},
+    "auto": {"quality": "draft"},
 }
 
 

@@ -30,6 +30,7 @@ SMALL = {
     "views": {"count": 2, "degrees": 1.0, "start": 22.0, "size": [64, 48]},
     "maps": {"size": 16},
     "trace": {"samples": 4, "depth": 2, "indirect": "none"},
+    "auto": {"quality": "draft"},
 }
 
 

@@ -222,6 +222,7 @@ def test_an_object_of_a_gltf_scene_is_baked_where_it_stands(tmp_path: Path) -> N
             "views": {"count": 2, "degrees": 2.0, "size": [64, 64]},
             "maps": {"size": 32},
             "trace": {"samples": 8},
+            "auto": {"quality": "draft"},
         },
         "scene",
     )
@@ -277,6 +278,7 @@ def test_files_that_a_scene_refers_to_are_part_of_it(tmp_path: Path) -> None:
         "views": {"count": 1, "size": [16, 16]},
         "maps": {"size": 8},
         "trace": {"indirect": "none", "samples": 1},
+        "auto": {"quality": "draft"},
     }
     config = parse_config(data, "scene")
     files = hash_inputs(config)["surroundings.scene"]["files"]

@@ -114,6 +114,7 @@ SCENE: dict[str, Any] = {
     "layers": {"diffuse": False},
     "maps": {"size": 16},
     "trace": {"samples": 8, "depth": 2, "indirect": "none"},
+    "auto": {"quality": "draft"},
 }
 
 

@@ -32,10 +32,14 @@ TEXELS = 6 * (64 + 16 + 4 + 1)
 HALF_ROUNDING = 2.0**-11
 
 
+CONFIG = {"maps": {"size": SIZE}, "reflector": {"mesh": "/a/cow.obj"}, "views": {"kind": "arc"}}
+
+
 def make_plan(samples: int = 4) -> Plan:
-    values: dict[str, bool | int | str] = {
-        "trace.depth": 2, "trace.samples": samples, "layers.diffuse": False,
+    values: dict[str, bool | int | float | str] = {
+        "trace.depth": 2, "trace.samples": samples, "trace.noise": 0.02, "layers.diffuse": False,
         "layers.local": True, "layers.hull_split": False, "maps.distant": "infinite", "maps.size": SIZE,
+        "views.traced": 0, "infer.passes": 2, "infer.neighbours": 0.3, "static.views": 0,
     }  # fmt: skip
     decisions = (Decision(key, None, value, True, "measured", 0.25) for key, value in values.items())
     return Plan(tuple(decisions), {"shape": "infinite", "origin": [0.0, 0.0, 0.0]})
@@ -45,14 +49,19 @@ def make_header(**changes: Any) -> Header:
     proxy: dict[str, Any] = {"shape": "infinite", "origin": [0.0, 0.0, 0.0]}
     distant = Shell("distant", proxy, "body/distant", "all", "rest", moves=False)
     header = Header(
-        source=Source("1.2.3", {"maps": {"size": SIZE}, "reflector": {"mesh": "/a/cow.obj"}}, {}),
+        source=Source(
+            "1.2.3",
+            {"maps": {"size": SIZE}, "reflector": {"mesh": "/a/cow.obj"}, "views": {"kind": "arc"}},
+            {},
+        ),
         plan=make_plan(),
         space=ParameterSpace((Axis("arc", (0.0, 0.5, 1.0), 0.0, 1.0),)),
         parts=(
             Part("body", (Shell("local", proxy, "body/local", "all", "itself", moves=True), distant)),
             Part("lid", (dataclasses.replace(distant, map="lid/distant"),)),
         ),
-        static={"infinite": proxy, "proxy": None},
+        static={"infinite": proxy, "proxy": None, "fade": None},
+        projection="cube",
         map_size=SIZE,
         precision="float16",
         image_size=(WIDTH, HEIGHT),
@@ -159,7 +168,7 @@ def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
     fill(make_store(tmp_path))
     group: Any = zarr.open_group(tmp_path / GROUP_NAME, mode="r")
     attributes: Any = group.attrs["mirrorbake"]
-    assert attributes["format_version"] == 3
+    assert attributes["format_version"] == 4
     sizes = attributes["conventions"]["level_sizes"]
     assert sizes == [8, 4, 2, 1]
     names = [entry["name"] for entry in attributes["maps"]]
@@ -281,7 +290,7 @@ def test_creation_that_fails_leaves_no_pem(tmp_path: Path, monkeypatch: pytest.M
     def fail(*arguments: Any) -> Any:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mirrorbake.pem.layout._put", fail)
+    monkeypatch.setattr("mirrorbake.pem.layout._make", fail)
     with pytest.raises(StoreError, match="No space left"):
         make_store(tmp_path)
     assert not PemStore.exists(tmp_path)
@@ -310,7 +319,7 @@ def test_damaged_metadata_is_one_clear_error(tmp_path: Path) -> None:
         other = json.loads(intact)
         other["attributes"]["mirrorbake"]["format_version"] = version
         metadata.write_text(json.dumps(other))
-        with pytest.raises(StoreError, match=f"format version {version}, this library reads 3.*{advice}"):
+        with pytest.raises(StoreError, match=f"format version {version}, this library reads 4.*{advice}"):
             PemStore.open(tmp_path)
 
 

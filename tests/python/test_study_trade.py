@@ -30,6 +30,7 @@ SCENE = {
     "layers": {"local": True, "hull_split": True, "diffuse": False},
     "maps": {"size": 16, "distant": "box"},
     "trace": {"samples": 8, "depth": 1, "indirect": "none"},
+    "auto": {"quality": "draft"},
 }
 
 

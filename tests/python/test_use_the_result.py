@@ -214,6 +214,7 @@ SMALL = {
     "maps": {"size": 32},
     "layers": {"local": True, "hull_split": True},
     "trace": {"samples": 4, "indirect": "none"},
+    "auto": {"quality": "draft"},
 }
 
 # Draws one picture with a given camera into floats.

@@ -88,8 +88,7 @@ LayerRows build_layer_rows(const FitModel& model, const DisplayView& view) {
     result.target[r] = last ? glm::vec4(view.targets->light_from(row.pixel.pixel, row.part, row.shell), 1.0F)
                             : view.targets->shell(row.pixel.pixel, row.part, row.shell);
     result.fresnel[r] = mean * fresnel;
-    result.coverage[r] = static_cast<float>(view.targets->count(row.pixel.pixel, row.part) /
-                                            view.targets->samples_per_pixel());
+    result.coverage[r] = view.targets->coverage(row.pixel.pixel, row.part);
   });
   return result;
 }
@@ -131,8 +130,7 @@ DisplayRows build_display_rows(const FitModel& model, const DisplayView& view, s
     for (int k = 0; k < 3; ++k) result.target[r][k] = fresnel[k] > 0.0F ? reflected[k] / fresnel[k] : 0.0F;
     result.fresnel[r] = fresnel;
     result.diffuse[r] = view.targets->diffuse(row.pixel);
-    result.coverage[r] =
-        static_cast<float>(view.targets->count(row.pixel) / view.targets->samples_per_pixel());
+    result.coverage[r] = view.targets->coverage(row.pixel);
   });
   return result;
 }

@@ -17,6 +17,7 @@ ViewTargets::ViewTargets(int width, int height, int parts, int shells)
   check_range("parts", parts, 1, 65536);
   check_range("shells", shells, 1, 64);
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  traced_.resize(pixels);
   counts_.resize(pixels * static_cast<std::size_t>(parts));
   reflected_.resize(pixels);
   diffuse_.resize(pixels);
@@ -62,7 +63,16 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
     throw InvalidArgument("samples", "light that is not finite in " + std::to_string(bad) + " samples",
                           "finite numbers");
   }
-  samples_per_pixel_ = std::max(samples_per_pixel_, static_cast<double>(samples.samples_per_pixel));
+  for (int row = 0; row < samples.height; ++row) {
+    for (int column = 0; column < samples.width; ++column) {
+      const auto from = static_cast<std::size_t>(row) * static_cast<std::size_t>(samples.width) +
+                        static_cast<std::size_t>(column);
+      const auto to = (static_cast<std::size_t>(y) + static_cast<std::size_t>(row)) *
+                          static_cast<std::size_t>(width_) +
+                      static_cast<std::size_t>(x) + static_cast<std::size_t>(column);
+      traced_[to] += samples.samples_in(from);
+    }
+  }
 }
 
 std::uint32_t ViewTargets::count(std::size_t pixel) const {

@@ -9,6 +9,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.bake.probe import LOBE_PROBE_SAMPLES, Probe, probe_points, relative_change, relative_spread
+from mirrorbake.bake.quality import quality_decisions
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, hull_triangles, proxy_to_attributes
 from mirrorbake.scene.plan import Decision, Plan
@@ -64,14 +65,16 @@ def analyze(stage: Stage) -> Plan:
     distant, proxy = _distant(stage, probe)
     on_hull = hull_triangles(stage.built.positions, stage.built.triangles)[probe.triangle]
     local = _local(stage, probe, on_hull)
+    samples = _samples(stage, int(depth.value))
     decisions = [
         depth,
-        _samples(stage, int(depth.value)),
+        samples,
         _diffuse(stage, probe),
         *local,
         _hull_split(stage, on_hull, any_local=any(decision.value for decision in local)),
         distant,
         _map_size(stage, proxy),
+        *quality_decisions(stage, int(samples.value)),
     ]
     return Plan(tuple(decisions), proxy_to_attributes(proxy))
 

@@ -6,23 +6,19 @@ import contextlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
-
-import numpy as np
+from typing import TYPE_CHECKING, TypeAlias
 
 from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
+from mirrorbake.bake.contents import contents_of, with_static_set
 from mirrorbake.bake.estimate import Estimate, estimate
-from mirrorbake.bake.sample import DIFFUSE_RAYS, SampleBaker
+from mirrorbake.bake.sample import SampleBaker
 from mirrorbake.bake.workers import bake_into, bake_on_workers
-from mirrorbake.errors import InputError, OptionError, StoreError
-from mirrorbake.pem.header import Header, Source
+from mirrorbake.errors import OptionError, StoreError
+from mirrorbake.pem.header import Source
 from mirrorbake.pem.location import GROUP_NAME, Location
-from mirrorbake.pem.run_time import TRACED_SAMPLES
-from mirrorbake.pem.shells import Part, Shell
-from mirrorbake.pem.store import Contents, PemStore, exclusive
+from mirrorbake.pem.store import PemStore, exclusive
 from mirrorbake.pem.verify import damaged_samples
-from mirrorbake.proxy import hull_triangles, proxy_to_attributes
 from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.parameters import space_of
 from mirrorbake.scene.stage import prepare_stage
@@ -31,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from mirrorbake.scene.build import BuiltScene
     from mirrorbake.scene.config import SceneConfig
     from mirrorbake.scene.plan import Plan
     from mirrorbake.scene.stage import Stage
@@ -124,7 +119,7 @@ def bake(
         else:
             report(0, total, "finding out what the scene requires")
             plan = analyze(stage)
-            store, contents = None, _contents(stage.planned(plan), plan, source)
+            store, contents = None, contents_of(stage.planned(plan), plan, source)
         plan = contents.header.plan
         stage = stage.planned(plan)
         if on_plan is not None:
@@ -138,6 +133,8 @@ def bake(
             if not on_estimate(estimate(stage, contents, len(missing))):
                 return summary
         if store is None:
+            contents, notes = with_static_set(stage, contents, report)
+            summary.notes.extend(notes)
             store = PemStore.create(location, contents)
         if workers is not None and missing:
             clamped = bake_on_workers(store, missing, workers, report)
@@ -207,66 +204,3 @@ def _check_output(location: Location, source: Source) -> None:
 
 def _is_partial(name: str) -> bool:
     return name.startswith(f".{GROUP_NAME}.") and name.endswith(".partial")
-
-
-def _contents(stage: Stage, plan: Plan, source: Source) -> Contents:
-    config, built, tracer = stage.config, stage.built, stage.tracer
-    origin = plan.distant["origin"]
-    capture = tracer.capture_cube(origin, plan.map_size, [built.reflector], stage.options)
-    irradiance = None
-    if plan.has_diffuse:
-        # Where the scene changes, every sample writes its own.
-        count = len(built.space) if built.space.changes_scene else 1
-        irradiance = np.zeros((count, len(built.positions), 3), np.float32)
-        if count == 1:
-            irradiance[0] = tracer.vertex_irradiance(built.reflector, DIFFUSE_RAYS, config.trace.seed)
-    header = Header(
-        source=source,
-        plan=plan,
-        space=built.space,
-        parts=tuple(_part(built, plan, number) for number in range(len(built.part_names))),
-        static={
-            "infinite": proxy_to_attributes(_core.Proxy.infinite(origin)),
-            "proxy": None if plan.distant["shape"] == "infinite" else plan.distant,
-        },
-        map_size=plan.map_size,
-        precision=config.maps.precision,
-        image_size=config.views.size,
-        run_time=_run_time(config, plan),
-    )
-    local_triangles = None
-    if plan.has_hull_split:
-        local_triangles = (~hull_triangles(built.positions, built.triangles)).astype(np.uint8)
-    if config.infer.fit == "display" and any(len(part.shells) < 2 for part in header.parts):
-        raise InputError('infer.fit = "display": needs both shells of every part; set layers.local = true')
-    return Contents(header, capture, irradiance, local_triangles)
-
-
-def _run_time(config: SceneConfig, plan: Plan) -> dict[str, Any]:
-    if config.infer.fit == "layers":
-        return {
-            "name": TRACED_SAMPLES,
-            "lookups": plan.samples,
-            "footprint_scale": config.infer.footprint_scale,
-        }
-    model = _core.run_time_model(config.infer.run_time)
-    return {
-        "name": config.infer.run_time,
-        "lookups": len(model.places),
-        "footprint_scale": model.footprint_scale,
-    }
-
-
-def _part(built: BuiltScene, plan: Plan, number: int) -> Part:
-    name = built.part_names[number]
-    shells = []
-    if plan.has_local(name):
-        triangles = built.triangles[built.parts == number]
-        centre = _core.area_weighted_centroid(built.positions, triangles)
-        ellipsoid = _core.fit_ellipsoid(built.positions[np.unique(triangles)], centre)
-        polygons: Literal["all", "off hull"] = "off hull" if plan.has_hull_split else "all"
-        shells.append(
-            Shell("local", proxy_to_attributes(ellipsoid), f"{name}/local", polygons, "itself", moves=True)
-        )
-    shells.append(Shell("distant", plan.distant, f"{name}/distant", "all", "rest", moves=False))
-    return Part(name, tuple(shells))

@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.pem.run_time import lookups_of, model_of
+from mirrorbake.bake.fit import DisplayFitter, FitView, solve_options
+from mirrorbake.bake.static_set import static_views
+from mirrorbake.bake.targets import ViewTracer
+from mirrorbake.pem.pyramid import capture, pyramid_of
+from mirrorbake.pem.run_time import lookups_of
 from mirrorbake.pem.store import SolverReport, Timings
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
+from mirrorbake.scene.neighbourhood import beside, block, views_around
 from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
@@ -21,6 +26,9 @@ if TYPE_CHECKING:
     from mirrorbake.scene.parameters import Point
     from mirrorbake.scene.stage import Stage
 
+    Maps = dict[tuple[str, str], FloatArray]
+    Reports = dict[tuple[str, str], SolverReport]
+
 DIFFUSE_RAYS = 1024
 """Gather rays per vertex of the diffuse layer."""
 
@@ -29,131 +37,166 @@ DIFFUSE_RAYS = 1024
 class BakedSample:
     """What is stored of a sample."""
 
-    maps: dict[tuple[str, str], FloatArray]
+    maps: Maps
     """Pyramids (texels, C) by part and shell."""
     images: ViewImages
     irradiance: FloatArray | None
     """(V, 3), where it differs from sample to sample."""
     timings: Timings
-    reports: dict[tuple[str, str], SolverReport]
+    reports: Reports
 
 
 class SampleBaker:
     """Bakes samples of a planned stage; keeps what they share, never what one leaves for another."""
 
     def __init__(self, stage: Stage, contents: Contents) -> None:
-        infer = stage.config.infer
         self._stage = stage
         self._header = contents.header
-        self._capture = _core.build_cube_pyramid(contents.capture)
+        self._capture = pyramid_of(contents.capture, contents.header.projection)
+        self._static_maps = contents.static_maps
         self._local_triangles = contents.local_triangles
-        self._layout = _core.CubePyramidLayout(contents.header.map_size)
-        self._lookup = lookups_of(infer.footprint_scale)
-        self._solve = _core.SolveOptions(
-            smoothness=infer.smoothness,
-            level_agreement=infer.level_agreement,
-            prior_weight=infer.prior_weight,
-            tolerance=infer.tolerance,
-            max_iterations=infer.iterations,
-        )
+        self._topology = contents.header.topology
+        self._infer = stage.config.infer
+        if self._infer.fit == "display":
+            self._tracer = ViewTracer(stage, contents.header)
+            self._fitter = DisplayFitter(contents.header, self._infer, contents.local_triangles)
 
     def bake(self, index: int) -> BakedSample:
         """Bake a sample."""
-        return self.bake_at(self._header.space.sample(index))
-
-    def bake_at(self, point: Point) -> BakedSample:
-        """Bake what the sample of a point would be."""
         start = time.perf_counter()
+        point = self._header.space.sample(index)
         stage = self._stage.at(point)
-        trace = self._stage.trace(point)
         irradiance = None
         if self._header.space.changes_scene and self._header.plan.has_diffuse:
             irradiance = stage.tracer.vertex_irradiance(
                 stage.built.reflector, DIFFUSE_RAYS, stage.config.trace.seed
             )
         capture = self._capture_of(stage)
-        seconds = [time.perf_counter() - start, 0.0, 0.0]
-        maps: dict[tuple[str, str], FloatArray] = {}
-        reports: dict[tuple[str, str], SolverReport] = {}
         pose = Pose.of(self._stage.config, self._header.space.scene_coordinates(point).get("motion", 0.0))
-        if self._stage.config.infer.fit == "display":
+        if self._infer.fit == "display":
+            return self._fit_display(index, stage, pose, capture, irradiance, start)
+        return self._fit_layers(point, pose, capture, irradiance, start)
+
+    def _fit_display(
+        self,
+        index: int,
+        stage: Stage,
+        pose: Pose,
+        capture: FloatArray,
+        irradiance: FloatArray | None,
+        start: float,
+    ) -> BakedSample:
+        header, tracer = self._header, self._tracer
+        own = tracer.at(header.space.sample(index))
+        nodes, views = [index], [FitView(own)]
+        if header.is_static_set:
+            views = static_views(tracer, stage)
+        else:
+            nodes, views = self._with_neighbours(index)
+        prior: FloatArray | None = None
+        if self._infer.prior == "captured":
+            prior = self._fitter.captured_prior(capture)
+            if self._static_maps is not None:
+                prior = np.ascontiguousarray(self._static_maps[..., :3])
+        middle = time.perf_counter()
+        texels, report = self._fitter.fit(views, pose, prior, len(nodes))
+        mine = texels[nodes.index(index)]
+        maps = {}
+        for name in header.map_names():
+            number = header.map_of(*name)
+            maps[name] = np.ascontiguousarray(mine[number, :, : header.maps[number].channels])
+        seconds = Timings(middle - start, 0.0, time.perf_counter() - middle)
+        return BakedSample(maps, own.images, irradiance, seconds, dict.fromkeys(maps, report))
+
+    def _with_neighbours(self, index: int) -> tuple[list[int], list[FitView]]:
+        """Return the nodes of the fit of a sample, and what it sees."""
+        space, infer, trace = self._header.space, self._infer, self._tracer.at
+        assert infer.neighbours is not None, "the scene has to be planned first"
+        assert self._stage.config.views.traced is not None, "the scene has to be planned first"
+        per_cell = self._stage.config.views.traced
+        between = views_around(space, index, per_cell, self._stage.config.trace.seed)
+        nodes = block(space, index) if between else [index]
+        views = [FitView(trace(space.sample(node)), ((i, 1.0),)) for i, node in enumerate(nodes)]
+        number = {node: i for i, node in enumerate(nodes)}
+        for view in between:
+            shares = tuple((number[node], weight) for node, weight in view.nodes)
+            views.append(FitView(trace(view.point), shares))
+        if infer.neighbours > 0.0:
+            mine = ((number[index], 1.0),)
+            views += [
+                FitView(trace(space.sample(other)), mine, infer.neighbours) for other in beside(space, index)
+            ]
+        return nodes, views
+
+    def _fit_layers(
+        self, point: Point, pose: Pose, capture: FloatArray, irradiance: FloatArray | None, start: float
+    ) -> BakedSample:
+        trace = self._stage.trace(point)
+        lookup = lookups_of(self._infer.footprint_scale)
+        seconds = [time.perf_counter() - start, 0.0, 0.0]
+        maps: Maps = {}
+        reports: Reports = {}
+        for entry in self._header.maps:
             start = time.perf_counter()
-            maps, reports = self._fit_display(point, trace.samples, pose, capture)
-            seconds[2] = time.perf_counter() - start
-            return BakedSample(maps, images_of_trace(trace), irradiance, Timings(*seconds), reports)
-        for number, part in enumerate(self._header.parts):
-            for shell in part.shells:
-                start = time.perf_counter()
-                off_hull = self._local_triangles if shell.polygons == "off hull" else None
-                matrix = _core.build_rendering_matrix(
-                    trace.samples, number, shell.proxy_at(pose), self._layout, self._lookup, off_hull
-                )
-                incident = _incident(trace.samples, part, shell)
-                target = matrix.average(incident)
-                middle = time.perf_counter()
-                prior = capture if shell.rule == "rest" else None
-                name = (part.name, shell.name)
-                maps[name], reports[name] = self._infer(matrix, target, prior)
-                seconds[1] += middle - start
-                seconds[2] += time.perf_counter() - middle
+            matrices, targets, prior = [], [], None
+            readers = []
+            for number, part in enumerate(self._header.parts):
+                for shell in part.shells:
+                    if shell.map != entry.name:
+                        continue
+                    readers.append((part.name, shell.name))
+                    prior = capture if shell.rule == "rest" else None
+                    off_hull = self._local_triangles if shell.polygons == "off hull" else None
+                    matrix = _core.build_rendering_matrix(
+                        trace.samples, number, shell.proxy_at(pose), self._topology, lookup, off_hull
+                    )
+                    if matrix.rows:
+                        matrices.append(matrix)
+                        targets.append(matrix.average(_incident(trace.samples, part, shell)))
+            middle = time.perf_counter()
+            texels, report = self._infer_layer(matrices, targets, prior, entry.channels)
+            maps.update(dict.fromkeys(readers, texels))
+            reports.update(dict.fromkeys(readers, report))
+            seconds[1] += middle - start
+            seconds[2] += time.perf_counter() - middle
         return BakedSample(maps, images_of_trace(trace), irradiance, Timings(*seconds), reports)
 
     def _capture_of(self, stage: Stage) -> FloatArray:
         if not stage.place:
             return self._capture
-        origin = self._header.plan.distant["origin"]
-        captured = stage.tracer.capture_cube(
-            origin, self._header.map_size, [stage.built.reflector], self._stage.options
-        )
-        return _core.build_cube_pyramid(captured)
-
-    def _fit_display(
-        self, point: Point, samples: _core.SurfaceSamples, pose: Pose, capture: FloatArray
-    ) -> tuple[dict[tuple[str, str], FloatArray], dict[tuple[str, str], SolverReport]]:
         header = self._header
-        model = model_of(header.run_time)
-        lookups = self._stage.visibility(point, model.places)
-        targets = _core.ViewTargets(samples.width, samples.height, len(header.parts), len(samples.shells))
-        targets.add(samples)
-        numbers = {entry.name: number for number, entry in enumerate(header.maps)}
-        prior = np.zeros((len(numbers), self._layout.texels, 3), np.float32)
-        parts = []
-        for part in header.parts:
-            shells = []
-            for shell in part.shells:
-                off_hull = self._local_triangles if shell.polygons == "off hull" else None
-                shells.append(_core.FitShell(shell.proxy_at(pose), numbers[shell.map], off_hull))
-                if shell.rule == "rest":
-                    prior[numbers[shell.map]] = capture
-            parts.append(shells)
-        texels, passes = _core.fit_display(
-            [_core.DisplayView(lookups, targets)],
-            parts,
-            [_core.TexelTopology.cube(header.map_size)] * len(numbers),
-            run_time=model,
-            options=_core.DisplayFitOptions(solve=self._solve),
-            prior=prior.reshape(-1, 3) if self._stage.config.infer.prior == "captured" else None,
+        captured = capture(
+            stage.tracer,
+            header.plan.distant["origin"],
+            header.projection,
+            header.map_size,
+            [stage.built.reflector],
+            self._stage.options,
         )
-        stacked = np.asarray(texels).reshape(len(numbers), -1, 4)
-        last = passes[-1]
-        report = SolverReport(last.iterations, float(last.relative_gradient), last.converged)
-        maps = {}
-        for name in header.map_names():
-            number = header.map_of(*name)
-            maps[name] = np.ascontiguousarray(stacked[number, :, : header.maps[number].channels])
-        return maps, dict.fromkeys(maps, report)
+        return pyramid_of(captured, header.projection)
 
-    def _infer(
-        self, matrix: _core.RenderingMatrix, target: FloatArray, prior: FloatArray | None
+    def _infer_layer(
+        self,
+        matrices: list[_core.RenderingMatrix],
+        targets: list[FloatArray],
+        prior: FloatArray | None,
+        channels: int,
     ) -> tuple[FloatArray, SolverReport]:
         # The solver starts from the captured map, never from a neighbour's maps as they were baked.
-        if matrix.rows == 0:
-            none = np.zeros((self._layout.texels, target.shape[1]), np.float32)
+        if not matrices:
+            none = np.zeros((self._topology.texels, channels), np.float32)
             return none if prior is None else np.asarray(prior), SolverReport(0, 0.0, True)
-        weights = _core.display_row_weights(matrix, self._stage.options.samples_per_pixel, target)
-        solver = _core.MapSolver([(matrix, [(0, 1.0)])], [self._layout], options=self._solve)
-        captured = self._stage.config.infer.prior == "captured"
-        texels, report = solver.solve([target], [weights], prior if captured else None, prior)
+        weights = [
+            _core.display_row_weights(matrix, self._stage.options.samples_per_pixel, target)
+            for matrix, target in zip(matrices, targets, strict=True)
+        ]
+        solver = _core.MapSolver(
+            [(matrix, [(0, 1.0)]) for matrix in matrices],
+            [self._topology],
+            options=solve_options(self._infer),
+        )
+        captured = self._infer.prior == "captured"
+        texels, report = solver.solve(targets, weights, prior if captured else None, prior)
         return np.asarray(texels), SolverReport(
             report.iterations, float(report.relative_gradient), report.converged
         )

@@ -54,6 +54,12 @@ def bake_command(
     em_size: EmSize = None,
     seed: Seed = None,
     assignments: Assignments = None,
+    quality: Annotated[
+        str | None,
+        typer.Option(
+            "--quality", metavar="draft|normal|high", help="What the bake may spend: sets auto.quality."
+        ),
+    ] = None,
     samples: Annotated[
         str | None,
         typer.Option("--samples", metavar="I:J", help="Only samples I to J-1. [default: all]"),
@@ -77,6 +83,8 @@ def bake_command(
     from mirrorbake.bake.bake import bake
     from mirrorbake.scene.parameters import space_of
 
+    if quality is not None:
+        assignments = [*(assignments or []), f"auto.quality={quality}"]
     config = scene_config(scene, assignments, views, size, spp, em_size, seed)
     chosen = None if samples is None else _parse_samples(samples, len(space_of(config)))
 

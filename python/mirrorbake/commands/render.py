@@ -46,11 +46,22 @@ def render_command(
             "--out", metavar="FILE", help="An .exr (scene-linear) or a .png (sRGB).", show_default=False
         ),
     ],
+    away: Annotated[
+        str,
+        typer.Option(
+            "--away",
+            metavar="AZIMUTH,ELEVATION",
+            help="Degrees that the eye moves on from there; the PEM fades to its static set.",
+        ),
+    ] = "0,0",
     threads: Threads = 0,
 ) -> None:
     """Draw a PEM at any point of its parameter space, blended between the neighbouring samples."""
     from mirrorbake.pem.render import render
 
     with _core.ThreadLimit(threads):
-        render(directory, _parse_point(view), out)
+        moved = _parse_point(away)
+        if len(moved) != 2:
+            raise OptionError(f"away = {away}: expected degrees of azimuth and elevation, such as 0,10")
+        render(directory, _parse_point(view), out, (moved[0], moved[1]))
     messages.print(f"wrote {out}", markup=False, soft_wrap=True)

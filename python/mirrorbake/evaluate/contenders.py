@@ -9,6 +9,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.evaluate.references import options_of
+from mirrorbake.pem.pyramid import pyramid_of
 from mirrorbake.pem.run_time import blended, lookups_of
 
 if TYPE_CHECKING:
@@ -87,6 +88,7 @@ TITLES: Mapping[str, str] = {
     "pem": "PEM",
     "pem_nearest": "PEM, nearest sample",
     "pem_single_infinite": "PEM, one layer at infinity",
+    "static_set": "Static set",
     "static_infinite": "Static map at infinity",
     "static_proxy": "Static map on the PEM's geometry",
 }
@@ -104,19 +106,30 @@ def contenders_of(pem: OpenedPem) -> dict[str, Contender]:
 
     def stored(name: str) -> Callable[[Frame, str], FloatArray]:
         return lambda frame, run_time: pem.run_time.render(
-            name, frame.view.point, frame.samples(run_time), run_time_of(pem, run_time)
+            name, frame.view.point, frame.samples(run_time), run_time_of(pem, run_time), away_of(pem, frame)
         )
 
     found = {"pem": stored("pem")}
     if len(pem.space) > 1:
         found["pem_nearest"] = lambda frame, run_time: pem.run_time.render(
-            "pem", nearest_sample(pem, frame.view.point), frame.samples(run_time), run_time_of(pem, run_time)
+            "pem",
+            nearest_sample(pem, frame.view.point),
+            frame.samples(run_time),
+            run_time_of(pem, run_time),
+            away_of(pem, frame),
         )
     found["pem_single_infinite"] = SingleLayer(pem).render
+    if pem.run_time.has_static_set:
+        found["static_set"] = stored("static_set")
     found["static_infinite"] = stored("static_infinite")
     if pem.run_time.has_static_proxy:
         found["static_proxy"] = stored("static_proxy")
     return {name: Contender(TITLES[name], render) for name, render in found.items()}
+
+
+def away_of(pem: OpenedPem, frame: Frame) -> float:
+    """Degrees from a frame's eye to the cameras of the PEM."""
+    return pem.stage.built.cameras.degrees_outside(frame.view.camera.eye)
 
 
 def nearest_sample(pem: OpenedPem, point: Point) -> Point:
@@ -135,7 +148,7 @@ class SingleLayer:
     def __init__(self, pem: OpenedPem) -> None:
         self._pem = pem
         header = pem.store.header
-        self._layout = _core.CubePyramidLayout(header.map_size)
+        self._topology = header.topology
         self._proxy = _core.Proxy.infinite(header.static["infinite"]["origin"])
         infer = pem.stage.config.infer
         self._lookup = lookups_of(infer.footprint_scale)
@@ -146,7 +159,7 @@ class SingleLayer:
             tolerance=infer.tolerance,
             max_iterations=infer.iterations,
         )
-        self._capture = _core.build_cube_pyramid(pem.store.read_capture())
+        self._capture = pyramid_of(pem.store.read_capture(), header.projection)
         self._maps: dict[int, list[FloatArray]] = {}
 
     def render(self, frame: Frame, run_time: str) -> FloatArray:
@@ -161,7 +174,7 @@ class SingleLayer:
             blended([(self._maps[i][part], weight) for i, weight in shares])
             for part in range(len(self._pem.store.header.parts))
         ]
-        parts = [[_core.ShellMap(self._proxy, self._layout, texels)] for texels in maps]
+        parts = [[_core.ShellMap(self._proxy, self._topology, texels)] for texels in maps]
         return self._pem.run_time.render_parts(
             parts, frame.samples(run_time), frame.view.point, run_time_of(self._pem, run_time)
         )
@@ -177,12 +190,12 @@ class SingleLayer:
             through *= 1.0 - radiance[:, 3:]
         maps = []
         for part in range(len(header.parts)):
-            matrix = _core.build_rendering_matrix(samples, part, self._proxy, self._layout, self._lookup)
+            matrix = _core.build_rendering_matrix(samples, part, self._proxy, self._topology, self._lookup)
             if matrix.rows == 0:
                 maps.append(np.asarray(self._capture))
                 continue
             target = matrix.average(incident)
             weights = _core.display_row_weights(matrix, stage.options.samples_per_pixel, target)
-            solver = _core.MapSolver([(matrix, [(0, 1.0)])], [self._layout], options=self._solve)
+            solver = _core.MapSolver([(matrix, [(0, 1.0)])], [self._topology], options=self._solve)
             maps.append(np.asarray(solver.solve([target], [weights], self._capture, self._capture)[0]))
         return maps

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.pem.pyramid import coarser_sizes
+from mirrorbake.pem.pyramid import FACES, Projection, coarser_sizes, topology_of
 from mirrorbake.pem.schema import FORMAT_VERSION, checksum_of
 from mirrorbake.pem.shells import MapEntry, Part, Shell, maps_of
 from mirrorbake.scene.parameters import ParameterSpace
@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 
 RECORD = ("trace_s", "build_s", "solve_s", "clamped_maps", "clamped_reference")
 MAP_RECORD = ("iterations", "gradient", "converged")
+
+_FACES: Mapping[str, str] = {
+    "cube": "+X -X +Y -Y +Z -Z, OpenGL orientation, row 0 on top",
+    "paraboloid": "front (+Z), back (-Z), row 0 on top",
+}
+"""What the attributes say of a map's faces, by its projection."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +99,12 @@ class Header:
     parts: tuple[Part, ...]
     """Of the reflector, in order."""
     static: dict[str, Any]
-    """Proxies of the static maps: `infinite`, and `proxy`: the distant layer's, None if that is infinite."""
+    """Proxies of the captured map: `infinite`, and `proxy`: the distant layer's, None if that is infinite.
+    `fade`: `degrees` beyond the samples at which half of the static set shows; None: there is no such set."""
+    projection: Projection
+    """Of all maps."""
     map_size: int
+    """Texels along a side of a face of the finest level."""
     precision: Literal["float16", "float32"]
     image_size: tuple[int, int]
     """Pixels: width, height."""
@@ -117,13 +127,14 @@ class Header:
             "conventions": {
                 "world": "right-handed, +Y up, metres",
                 "radiance": "scene-linear, Rec.709 primaries",
-                "faces": "+X -X +Y -Y +Z -Z, OpenGL orientation, row 0 on top",
+                "faces": _FACES[self.projection],
                 "texels": "finest level (face, row, column), then the residuals of the coarser levels",
                 "residuals": "level l = mean of 2x2 blocks of level l-1, from the finest down, plus residual",
                 "level_sizes": [self.map_size, *coarser_sizes(self.map_size)],
                 "shells": "front to back, L = L0 + (1 - a0)(L1 + (1 - a1)(...)); RGBA premultiplied by a",
                 "reference": "R G B of the object, its coverage, R G B of the background times the rest",
             },
+            "projection": self.projection,
             "map_size": self.map_size,
             "precision": self.precision,
             "image_size": list(self.image_size),
@@ -157,11 +168,27 @@ class Header:
             space=ParameterSpace.from_attributes(attributes["space"]),
             parts=tuple(parts),
             static=attributes["static"],
+            projection=attributes["projection"],
             map_size=attributes["map_size"],
             precision=attributes["precision"],
             image_size=(width, height),
             run_time=attributes["run_time"],
         )
+
+    @property
+    def faces(self) -> int:
+        """Of a map: 6 of a cube, 2 of a dual paraboloid."""
+        return FACES[self.projection]
+
+    @property
+    def topology(self) -> _core.TexelTopology:
+        """How the texels of a map lie to each other."""
+        return topology_of(self.projection, self.map_size)
+
+    @property
+    def is_static_set(self) -> bool:
+        """Whether the maps have no parameters: they were inferred from views all around."""
+        return bool(self.source.config["views"]["kind"] == "none")
 
     @property
     def maps(self) -> tuple[MapEntry, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 import zarr
 from zarr.codecs import BloscCodec, BloscShuffle, Crc32cCodec
 
-from mirrorbake.pem.pyramid import LARGEST_HALF, residual_texels, split_pyramid
+from mirrorbake.pem.pyramid import LARGEST_HALF, join_pyramid, split_pyramid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -61,18 +61,20 @@ class Contents:
 
     header: Header
     capture: FloatArray
-    """The static map's finest level, shape (6, S, S, 3)."""
+    """The captured map's finest level, shape (F, S, S, 3), F faces."""
     irradiance: FloatArray | None
     """Diffuse layer, shape (1, V, 3), or (N, V, 3) that each sample fills; None: there is none."""
     local_triangles: NDArray[np.uint8] | None
     """Shape (T,), 0 for triangles of the reflector that shells for `off hull` leave out; None: for none."""
+    static_maps: FloatArray | None = None
+    """The static set, (M, T, 4): pyramids of all maps, premultiplied radiance and α; None: there is none."""
 
 
 def sample_layouts(header: Header) -> dict[str, Layout]:
     """Return the arrays that have an object per sample."""
-    samples, maps, size = len(header.space), header.maps, header.map_size
+    samples, maps = len(header.space), header.maps
     width, height = header.image_size
-    texels = 6 * size * size + residual_texels(size)
+    texels = header.topology.texels
     channels = max(entry.channels for entry in maps)
     columns = len(header.record_columns)
     return {
@@ -117,23 +119,29 @@ def fill_group(store: Store, contents: Contents) -> None:
             config={"write_empty_chunks": True},
             overwrite=True,
         )
-    _put(group, "static/capture", capture, ("face", "row", "column", "channel"), capture.shape)
+    dimensions = ("face", "row", "column", "channel")
+    _make(group, "static/capture", capture, dimensions, capture.shape)[...] = capture
     if irradiance is not None:
         shape = (1, *irradiance.shape[1:])
-        _put(group, "diffuse/irradiance", irradiance, ("sample", "vertex", "channel"), shape)
+        array = _make(group, "diffuse/irradiance", irradiance, ("sample", "vertex", "channel"), shape)
+        # Where the scene changes, every sample writes its own.
+        if not header.space.changes_scene:
+            array[...] = irradiance
+    if contents.static_maps is not None:
+        stored = np.stack([stored_map(pyramid, header)[0] for pyramid in contents.static_maps])
+        chunk = (1, *stored.shape[1:])
+        _make(group, "static/maps", stored, ("map", "texel", "channel"), chunk)[...] = stored
     if local_triangles is not None:
-        _put(group, "local_triangles", local_triangles, ("triangle",), local_triangles.shape)
+        shape = local_triangles.shape
+        _make(group, "local_triangles", local_triangles, ("triangle",), shape)[...] = local_triangles
     group.attrs[ATTRIBUTE] = header.to_attributes()
 
 
-def _put(
-    group: zarr.Group,
-    name: str,
-    data: FloatArray | NDArray[np.uint8],
-    dimensions: tuple[str, ...],
-    chunk: tuple[int, ...],
-) -> None:
-    array = group.create_array(
+def _make(
+    group: zarr.Group, name: str, data: NDArray[Any], dimensions: tuple[str, ...], chunk: tuple[int, ...]
+) -> zarr.Array[Any]:
+    """Make an array for data, empty."""
+    return group.create_array(
         name,
         shape=data.shape,
         chunks=chunk,
@@ -144,14 +152,19 @@ def _put(
         config={"write_empty_chunks": True},
         overwrite=True,
     )
-    if data.shape[0] == chunk[0]:
-        array[...] = data
 
 
 def stored_map(pyramid: FloatArray, header: Header) -> tuple[NDArray[Any], int]:
     """Return a pyramid as `maps` holds it, (T, C), and how many values were clamped."""
-    finest, residuals, clamped = split_pyramid(pyramid, header.map_size, header.precision)
+    finest, residuals, clamped = split_pyramid(pyramid, header.map_size, header.precision, header.faces)
     return np.concatenate([finest.reshape(-1, finest.shape[-1]), residuals]), clamped
+
+
+def read_back(stored: NDArray[Any], header: Header) -> FloatArray:
+    """Inverse of `stored_map`, up to the rounding of the storage."""
+    count = header.faces * header.map_size**2
+    shape = (header.faces, header.map_size, header.map_size, stored.shape[-1])
+    return join_pyramid(stored[:count].reshape(shape), stored[count:])
 
 
 def stored_images(images: ViewImages, precision: str) -> tuple[NDArray[Any], int]:

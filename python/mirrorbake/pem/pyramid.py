@@ -2,16 +2,56 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from mirrorbake import _core
+from mirrorbake.envmap import EnvMap
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
 
 LARGEST_HALF = 65504.0
+
+
+FACES = {"cube": 6, "paraboloid": 2}
+"""By the projection of maps."""
+
+Projection = Literal["cube", "paraboloid"]
+
+
+def topology_of(projection: Projection, size: int) -> _core.TexelTopology:
+    """Return how the texels of a map lie to each other."""
+    if projection == "cube":
+        return _core.TexelTopology.cube(size)
+    return _core.TexelTopology.dual_paraboloid(size)
+
+
+def pyramid_of(finest: FloatArray, projection: Projection) -> FloatArray:
+    """Return all levels (texels, C) of a finest level (F, S, S, C), weighted by solid angles."""
+    if projection == "cube":
+        return np.asarray(_core.build_cube_pyramid(finest))
+    mips = EnvMap.from_array(finest, "dual_paraboloid").mips()
+    return np.ascontiguousarray(mips.values.reshape(-1, finest.shape[-1]))
+
+
+def capture(
+    tracer: _core.Tracer,
+    origin: Sequence[float],
+    projection: Projection,
+    size: int,
+    hidden: Sequence[int],
+    options: _core.TraceOptions,
+) -> FloatArray:
+    """Return the radiance (F, S, S, 3) that arrives at a point, some objects removed."""
+    if projection == "cube":
+        return np.asarray(tracer.capture_cube(origin, size, hidden, options))
+    return np.asarray(tracer.capture(origin, "dual_paraboloid", size, size, hidden, options))
 
 
 def decimate(level: FloatArray) -> FloatArray:
@@ -20,21 +60,21 @@ def decimate(level: FloatArray) -> FloatArray:
     Parameters
     ----------
     level
-        Shape (6, S, S, C), S even, float32.
+        Shape (F, S, S, C), S even, float32.
 
     Returns
     -------
     array
-        Shape (6, S/2, S/2, C), float32.
+        Shape (F, S/2, S/2, C), float32.
     """
     top = level[:, 0::2, 0::2] + level[:, 0::2, 1::2]
     bottom = level[:, 1::2, 0::2] + level[:, 1::2, 1::2]
     return (top + bottom) * np.float32(0.25)
 
 
-def residual_texels(size: int) -> int:
+def residual_texels(size: int, faces: int = 6) -> int:
     """Number of texels of all levels but the finest, for a power of two."""
-    return sum(6 * s * s for s in coarser_sizes(size))
+    return sum(faces * s * s for s in coarser_sizes(size))
 
 
 def coarser_sizes(size: int) -> list[int]:
@@ -42,7 +82,9 @@ def coarser_sizes(size: int) -> list[int]:
     return [size >> level for level in range(1, size.bit_length())]
 
 
-def split_pyramid(pyramid: FloatArray, size: int, dtype: str) -> tuple[NDArray[Any], NDArray[Any], int]:
+def split_pyramid(
+    pyramid: FloatArray, size: int, dtype: str, faces: int = 6
+) -> tuple[NDArray[Any], NDArray[Any], int]:
     """Split a pyramid into what is stored: the finest level and the residuals of the others.
 
     Parameters
@@ -54,11 +96,13 @@ def split_pyramid(pyramid: FloatArray, size: int, dtype: str) -> tuple[NDArray[A
     dtype
         'float16' or 'float32'. Residuals refer to the finest level as it is stored, so they also take up its
         rounding.
+    faces
+        Of the projection (`FACES`).
 
     Returns
     -------
     tuple
-        The finest level (6, S, S, C), the residuals (R, C), and how many values were clamped to ±65504
+        The finest level (F, S, S, C), the residuals (R, C), and how many values were clamped to ±65504
         because float16 ends there.
     """
     channels = pyramid.shape[1]
@@ -66,14 +110,14 @@ def split_pyramid(pyramid: FloatArray, size: int, dtype: str) -> tuple[NDArray[A
     if dtype == "float16":
         clamped = int(np.count_nonzero(np.abs(pyramid) > LARGEST_HALF))
         pyramid = np.clip(pyramid, -LARGEST_HALF, LARGEST_HALF)
-    count = 6 * size * size
-    finest = pyramid[:count].reshape(6, size, size, channels).astype(dtype)
-    residuals = np.empty((residual_texels(size), channels), dtype)
+    count = faces * size * size
+    finest = pyramid[:count].reshape(faces, size, size, channels).astype(dtype)
+    residuals = np.empty((residual_texels(size, faces), channels), dtype)
     level = finest.astype(np.float32)
     offset = 0
     for s in coarser_sizes(size):
         level = decimate(level)
-        texels = 6 * s * s
+        texels = faces * s * s
         values = pyramid[count + offset : count + offset + texels]
         residuals[offset : offset + texels] = (values - level.reshape(texels, channels)).astype(dtype)
         offset += texels
@@ -82,15 +126,15 @@ def split_pyramid(pyramid: FloatArray, size: int, dtype: str) -> tuple[NDArray[A
 
 def join_pyramid(finest: NDArray[Any], residuals: NDArray[Any]) -> FloatArray:
     """Inverse of `split_pyramid`, up to the rounding of the storage. Returns shape (texels, C), float32."""
-    size, channels = finest.shape[1], finest.shape[3]
+    faces, size, channels = finest.shape[0], finest.shape[1], finest.shape[3]
     level = finest.astype(np.float32)
-    pyramid = np.empty((6 * size * size + residuals.shape[0], channels), np.float32)
-    offset = 6 * size * size
+    offset = faces * size * size
+    pyramid = np.empty((offset + residuals.shape[0], channels), np.float32)
     pyramid[:offset] = level.reshape(-1, channels)
     for s in coarser_sizes(size):
         level = decimate(level)
-        texels = 6 * s * s
-        start = offset - 6 * size * size
+        texels = faces * s * s
+        start = offset - faces * size * size
         pyramid[offset : offset + texels] = (
             level.reshape(texels, channels) + residuals[start : start + texels]
         )

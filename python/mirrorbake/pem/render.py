@@ -21,7 +21,12 @@ if TYPE_CHECKING:
 PICTURE_SUFFIXES = (".exr", ".png")
 
 
-def render(directory: str | PathLike[str], point: PointLike, out: str | PathLike[str]) -> FloatArray:
+def render(
+    directory: str | PathLike[str],
+    point: PointLike,
+    out: str | PathLike[str],
+    away: tuple[float, float] = (0.0, 0.0),
+) -> FloatArray:
     """Draw a PEM over its ray-traced background and write the picture.
 
     Parameters
@@ -33,6 +38,8 @@ def render(directory: str | PathLike[str], point: PointLike, out: str | PathLike
         multilinear weights.
     out
         An .exr (scene-linear, float16) or a .png (clipped to [0,1] and sRGB-encoded, 8 bit).
+    away
+        Degrees of azimuth and elevation that the eye moves on from the point's place.
 
     Returns
     -------
@@ -48,13 +55,15 @@ def render(directory: str | PathLike[str], point: PointLike, out: str | PathLike
     if out.suffix.lower() not in PICTURE_SUFFIXES:
         raise InputError(f"{out}: expected a name that ends in {' or '.join(PICTURE_SUFFIXES)}")
     check_writable(out)
-    picture = picture_of(open_pem(Path(directory)), point)
+    picture = picture_of(open_pem(Path(directory)), point, away)
     _core.save_image(str(out), picture, ["R", "G", "B"])
     return picture
 
 
-def picture_of(pem: OpenedPem, point: PointLike) -> FloatArray:
+def picture_of(pem: OpenedPem, point: PointLike, away: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
     """Draw an opened PEM over its ray-traced background; as `render`, which writes the picture too."""
+    if any(away):
+        return _picture_from_beyond(pem, point, away)
     blend = pem.space.neighbours(point)
     if len(blend) == 1 and pem.space.sample(blend[0][0]) == pem.space.point(point):
         images = pem.store.read_images(blend[0][0])
@@ -62,3 +71,17 @@ def picture_of(pem: OpenedPem, point: PointLike) -> FloatArray:
         images = images_of_trace(pem.stage.trace(point))
     samples = pem.stage.visibility(point, pem.run_time.places)
     return images.composite(pem.run_time.render("pem", point, samples))
+
+
+def _picture_from_beyond(pem: OpenedPem, point: PointLike, away: tuple[float, float]) -> FloatArray:
+    stage, model = pem.stage.at(point), pem.run_time.model
+    cameras = stage.built.cameras
+    azimuth, elevation = cameras.angles_of(cameras.eye(pem.space.point(point)))
+    if not abs(elevation + away[1]) < 90.0:
+        raise InputError(f"away = {away[0]:g},{away[1]:g}: the eye would pass straight above or below")
+    camera = cameras.around(azimuth + away[0], elevation + away[1])
+    reflector = stage.built.reflector
+    images = images_of_trace(stage.tracer.trace_layers(camera, reflector, stage.options))
+    samples = stage.tracer.trace_visibility(camera, reflector, stage.options, pem.run_time.places)
+    degrees = cameras.degrees_outside(camera.eye)
+    return images.composite(pem.run_time.render("pem", point, samples, model, degrees))

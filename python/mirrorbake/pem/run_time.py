@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.errors import StoreError
+from mirrorbake.pem.pyramid import pyramid_of
 from mirrorbake.proxy import proxy_from_attributes
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.pose import Pose
@@ -19,7 +21,6 @@ if TYPE_CHECKING:
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
-    from mirrorbake.pem.shells import Part
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.parameters import PointLike
 
@@ -52,6 +53,47 @@ def model_of(run_time: Mapping[str, Any]) -> _core.RunTimeModel:
     return _core.run_time_model(run_time["name"])
 
 
+def fade_weight(degrees: float, away: float) -> float:
+    """Return how much of a PEM is drawn in a view beyond its samples; the rest is its static set.
+
+    1 / (1 + (δ/δ₀)²), which is 1 on the samples and ½ at δ₀.
+
+    Parameters
+    ----------
+    degrees
+        δ₀, of the header's `static["fade"]`.
+    away
+        δ, degrees between the eye and the nearest place of the samples' cameras, seen from their centre.
+
+    Examples
+    --------
+    >>> fade_weight(4.0, 0.0), fade_weight(4.0, 4.0)
+    (1.0, 0.5)
+    """
+    return 1.0 / (1.0 + (away / degrees) ** 2)
+
+
+def shell_maps(
+    header: Header,
+    read: Callable[[str, str], FloatArray],
+    pose: Pose,
+    local_triangles: NDArray[np.uint8] | None,
+) -> list[list[_core.ShellMap]]:
+    """Return the shells of all parts, to be drawn; `read(part, shell)` gives the texels of a map."""
+    return [
+        [
+            _core.ShellMap(
+                shell.proxy_at(pose),
+                header.topology,
+                read(part.name, shell.name),
+                local_triangles if shell.polygons == "off hull" else None,
+            )
+            for shell in part.shells
+        ]
+        for part in header.parts
+    ]
+
+
 TRACED_SAMPLES = "reference"
 """Name of the run time that reads maps once for every traced sample."""
 
@@ -71,13 +113,14 @@ class RunTime:
 
     def __post_init__(self) -> None:
         self._header: Header = self.store.header
-        self._layout = _core.CubePyramidLayout(self._header.map_size)
+        self._topology = self._header.topology
         self._options = model_of(self._header.run_time)
         self._config = parse_config(self._header.source.config, str(self.store.location))
         self._irradiance = self.store.read_irradiance()
         self._local_triangles = self.store.read_local_triangles()
-        self._static = _core.build_cube_pyramid(self.store.read_capture())
+        self._static = pyramid_of(self.store.read_capture(), self._header.projection)
         self._views: dict[int, dict[tuple[str, str], FloatArray]] = {}
+        self._static_maps = self._read_static_maps()
 
     @property
     def model(self) -> _core.RunTimeModel:
@@ -90,6 +133,11 @@ class RunTime:
         return () if self._header.run_time["name"] == TRACED_SAMPLES else self._options.places
 
     @property
+    def has_static_set(self) -> bool:
+        """Whether there are maps for views far from all samples."""
+        return self._static_maps is not None
+
+    @property
     def has_static_proxy(self) -> bool:
         """Whether the static map on the distant layer's geometry is a contender: it is not at infinity."""
         return self._header.static["proxy"] is not None
@@ -100,19 +148,23 @@ class RunTime:
         point: PointLike,
         samples: _core.SurfaceSamples,
         model: _core.RunTimeModel | None = None,
+        away: float = 0.0,
     ) -> FloatArray:
         """Draw the reflector.
 
         Parameters
         ----------
         contender
-            `pem`, `static_infinite` or `static_proxy`.
+            `pem`, `static_set`, `static_infinite` or `static_proxy`.
         point
             Of the parameter space; between nodes the PEM blends their maps by multilinear weights.
         samples
             Where the camera of the point sees the reflector, at the places of the run time.
         model
             How maps are read; None: as they were when they were inferred.
+        away
+            Degrees from the eye to the cameras of the space (`Cameras.degrees_outside`): the PEM fades to its
+            static set, if it has one.
 
         Returns
         -------
@@ -120,7 +172,9 @@ class RunTime:
             Radiance (H, W, 3), the mean over the samples that see the reflector; 0 where there are none.
         """
         if contender == "pem":
-            parts = self._pem_parts(point)
+            parts = self._pem_parts(point, away)
+        elif contender == "static_set":
+            parts = self._shells(self._static_texels, point)
         else:
             parts = self._static_parts("infinite" if contender == "static_infinite" else "proxy")
         return self.render_parts(parts, samples, point, model)
@@ -140,19 +194,38 @@ class RunTime:
         coverage = image[..., 3:]
         return np.divide(image[..., :3], coverage, out=np.zeros_like(image[..., :3]), where=coverage > 0.0)
 
-    def _pem_parts(self, point: PointLike) -> list[list[_core.ShellMap]]:
+    def _pem_parts(self, point: PointLike, away: float) -> list[list[_core.ShellMap]]:
         blend = self._header.space.neighbours(point)
         self._views = {i: self._views.get(i) or self._read_view(i) for i, _ in blend}
-        pose = self._pose_at(point)
-        return [self._part_maps(part, blend, pose) for part in self._header.parts]
+        fade = self._header.static["fade"]
+        share = 1.0 if fade is None else fade_weight(fade["degrees"], away)
 
-    def _part_maps(self, part: Part, blend: list[tuple[int, float]], pose: Pose) -> list[_core.ShellMap]:
-        shells = []
-        for shell in part.shells:
-            texels = blended([(self._views[i][part.name, shell.name], share) for i, share in blend])
-            off_hull = self._local_triangles if shell.polygons == "off hull" else None
-            shells.append(_core.ShellMap(shell.proxy_at(pose), self._layout, texels, off_hull))
-        return shells
+        def read(part: str, shell: str) -> FloatArray:
+            shares = [(self._views[i][part, shell], share * weight) for i, weight in blend]
+            if share < 1.0:
+                shares.append((self._static_texels(part, shell), 1.0 - share))
+            return blended(shares)
+
+        return self._shells(read, point)
+
+    def _shells(self, read: Callable[[str, str], FloatArray], point: PointLike) -> list[list[_core.ShellMap]]:
+        return shell_maps(self._header, read, self._pose_at(point), self._local_triangles)
+
+    def _static_texels(self, part: str, shell: str) -> FloatArray:
+        if self._static_maps is None:
+            raise StoreError(f"{self.store.location}: has no static set")
+        return self._static_maps[part, shell]
+
+    def _read_static_maps(self) -> dict[tuple[str, str], FloatArray] | None:
+        stored = self.store.read_static_maps()
+        if stored is None:
+            return None
+        found = {}
+        for name in self._header.map_names():
+            number = self._header.map_of(*name)
+            texels = np.ascontiguousarray(stored[number, :, : self._header.maps[number].channels])
+            found[name] = texels if self.remap is None else self.remap(texels)
+        return found
 
     def _pose_at(self, point: PointLike) -> Pose:
         space = self._header.space
@@ -174,4 +247,4 @@ class RunTime:
 
     def _static_parts(self, shape: str) -> list[list[_core.ShellMap]]:
         proxy = proxy_from_attributes(self._header.static[shape])
-        return [[_core.ShellMap(proxy, self._layout, self._static)] for _ in self._header.parts]
+        return [[_core.ShellMap(proxy, self._topology, self._static)] for _ in self._header.parts]

@@ -14,7 +14,7 @@ from mirrorbake.errors import StoreError
 from mirrorbake.proxy import proxy_from_attributes
 from mirrorbake.scene.config_values import MAX_IMAGE_SIDE, MAX_MAP_SIZE
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 MAX_SAMPLES = 100_000_000
 MAX_PARTS = 65535
 
@@ -90,11 +90,18 @@ class MapAttributes(_Model):
     channels: Literal[3, 4]
 
 
+class FadeAttributes(_Model):
+    """How a PEM fades to the static set."""
+
+    degrees: Annotated[Number, Field(gt=0, le=1000)]
+
+
 class StaticAttributes(_Model):
-    """Shapes for the static map."""
+    """Shapes for the captured map, and when the static set is drawn."""
 
     infinite: ProxyAttributes
     proxy: ProxyAttributes | None
+    fade: FadeAttributes | None
 
 
 class RunTimeAttributes(_Model):
@@ -109,10 +116,11 @@ class Attributes(_Model):
     """All of the group's attribute."""
 
     format: Literal["pem"]
-    format_version: Literal[3]
+    format_version: Literal[4]
     library: Annotated[str, Field(max_length=100)]
     fingerprint: Sha256
     conventions: dict[str, Any]
+    projection: Literal["cube", "paraboloid"]
     map_size: Annotated[int, Field(ge=1, le=MAX_MAP_SIZE)]
     precision: Literal["float16", "float32"]
     image_size: Annotated[

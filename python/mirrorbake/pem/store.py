@@ -1,6 +1,6 @@
 """A parameterized environment map on disk: a Zarr v3 group, readable by anyone.
 
-`DIR/pem.zarr` holds, for N samples and M maps of S² texels a face:
+`DIR/pem.zarr` holds, for N samples and M maps of F faces of S² texels:
 
 ===================== =============== ================================================================
 array                 shape           holds
@@ -9,7 +9,8 @@ array                 shape           holds
 `reference`           (N, H, W, 7)    ray traced: object R G B, its coverage, background R G B
 `record`              (N, K)          seconds, clamped values and the solver's report. Written last
 `diffuse/irradiance`  (1 or N, V, 3)  W m⁻² at the object's vertices, if it has a diffuse layer
-`static/capture`      (6, S, S, 3)    traced from the object's centre, the object removed
+`static/capture`      (F, S, S, 3)    traced from the object's centre, the object removed
+`static/maps`         (M, T, 4)       the static set: maps for views far from all samples, if there is one
 `local_triangles`     (T,)            0: on the convex hull, where no shell for `off hull` is read
 ===================== =============== ================================================================
 
@@ -38,6 +39,7 @@ from mirrorbake.pem.layout import (
     SolverReport,
     Timings,
     fill_group,
+    read_back,
     sample_layouts,
     stored_images,
     stored_map,
@@ -52,7 +54,6 @@ from mirrorbake.pem.location import (
     rename_unless_there,
     stored_bytes,
 )
-from mirrorbake.pem.pyramid import join_pyramid
 from mirrorbake.pem.schema import check_attributes
 from mirrorbake.pem.view_images import ViewImages
 
@@ -295,13 +296,11 @@ class PemStore:
     def read_map(self, part: str, layer: str, index: int) -> FloatArray:
         """Pyramid of the map of a part's shell in one sample, shape (texels, C), float32."""
         number = self.header.map_of(part, layer)
-        channels, size = self.header.maps[number].channels, self.header.map_size
         array = self._array("maps")
         if not has_key(self._group.store, _key(array, "maps", index)):
             raise StoreError(f"{self.location}/{GROUP_NAME}: damaged: sample {index} of maps is missing")
-        values = self._read("maps", (index, number))[:, :channels]
-        finest = values[: 6 * size * size].reshape(6, size, size, channels)
-        return join_pyramid(finest, values[6 * size * size :])
+        channels = self.header.maps[number].channels
+        return read_back(self._read("maps", (index, number))[:, :channels], self.header)
 
     def read_images(self, index: int) -> ViewImages:
         """Ray-traced images of one sample."""
@@ -326,11 +325,21 @@ class PemStore:
             self.read_capture(),
             None if irradiance is None else irradiance[None],
             self.read_local_triangles(),
+            self.read_static_maps(),
         )
 
     def read_capture(self) -> FloatArray:
-        """Finest level of the static map, shape (6, S, S, 3)."""
+        """Finest level of the static map, shape (F, S, S, 3)."""
         return self._read("static/capture").astype(np.float32)
+
+    def read_static_maps(self) -> FloatArray | None:
+        """The static set: pyramids (M, texels, 4) of all maps; None if there is none."""
+        if "static/maps" not in self._group:
+            return None
+        stored = self._read("static/maps")
+        if stored.shape != (len(self.header.maps), self.header.topology.texels, 4):
+            raise StoreError(f"{self.location}: damaged: static/maps has the shape {stored.shape}")
+        return np.stack([read_back(pyramid, self.header) for pyramid in stored])
 
     def read_irradiance(self, index: int = 0) -> FloatArray | None:
         """Irradiance at the object's vertices in one sample, shape (V, 3); None without a diffuse layer."""
@@ -360,7 +369,7 @@ class PemStore:
 
     def array_names(self) -> list[str]:
         """Names of the arrays that are not of single samples."""
-        names = ["static/capture", "local_triangles"]
+        names = ["static/capture", "static/maps", "local_triangles"]
         if not self.has_irradiance_per_sample:
             names.append("diffuse/irradiance")
         return [name for name in names if name in self._group]

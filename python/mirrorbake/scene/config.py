@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from mirrorbake import _core
 from mirrorbake.scene.config_values import (
@@ -20,9 +20,10 @@ from mirrorbake.scene.config_values import (
     Reflectance,
     Section,
     Vec3,
+    as_tuple,
     with_default,
 )
-from mirrorbake.scene.config_views import Light, Motion, Views
+from mirrorbake.scene.config_views import Elevation, Light, Motion, Views
 
 ILLUMINANT: Final = "D65"
 """Under which the colours of metals are meant: the white of Rec.709."""
@@ -195,13 +196,17 @@ class Maps(Section):
     """[maps]: the environment maps."""
 
     size: Annotated[MapSize | None, *AUTO] = None
-    """Texels along a side of a cube face, a power of two. "auto": what the views can tell apart."""
+    """Texels along a side of a face, a power of two. "auto": what the views can tell apart."""
+    projection: Literal["cube", "paraboloid"] = "cube"
+    """Six faces, or two dual paraboloids of a third of the texels, which some exports do not take."""
     distant: Annotated[DistantShape | None, *AUTO] = None
     """Geometry of the distant layer. "auto": the simplest shape that predicts where reflected rays end."""
     box: Literal["angle", "robust", "mean_distance"] = "angle"
     """How a box is fitted to the surroundings that the object sees: to the angles under which the map's
     origin sees them, as the other shapes are; to the walls by robust least squares; or with its bottom below
     the object and the other sides at the mean distance ([PEM] §4)."""
+    shared_distant: bool = False
+    """Whether all parts read one distant map, which saves a map for each further part ([PEM] §6)."""
     precision: Literal["float16", "float32"] = "float16"
     """Storage of the maps on disk."""
 
@@ -211,6 +216,11 @@ class Trace(Section):
 
     samples: Annotated[Annotated[int, Field(ge=1, le=65536)] | None, *AUTO] = None
     """Per pixel. "auto": 16, or as many as a rough reflector's lobe needs."""
+    noise: Annotated[Annotated[float, Field(ge=0, lt=1)] | None, *AUTO] = None
+    """Standard error of a pixel's displayed value, 0 to 1, above which a pixel gets more than `samples`; 0:
+    none does. "auto": by `auto.quality`."""
+    most_samples: Annotated[int, Field(ge=1, le=65536)] = 256
+    """Per pixel, that `noise` may lead to."""
     depth: Annotated[Annotated[int, Field(ge=0, le=64)] | None, *AUTO] = None
     """Specular bounces after the first. "auto": as many as change the picture."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
@@ -223,12 +233,18 @@ class Trace(Section):
 class Infer(Section):
     """[infer]: how the maps are solved for."""
 
-    fit: Literal["layers", "display"] = "layers"
-    """`layers`: every shell is fitted to the light that it holds. `display`: all shells and parts together to
-    the pixels that `run_time` will show, as a display shows them."""
+    fit: Literal["layers", "display"] = "display"
+    """`display`: all shells and parts together, to the pixels that `run_time` will show, as a display shows
+    them. `layers`: every shell by itself, to the light that it holds, as [PEM] §4 does."""
     run_time: Literal["Web", "Web1", "Reference"] = "Web"
     """What draws the maps of fit = "display": 4 lookups a pixel with up to 4 taps, as the page does; one
     lookup; 16 lookups."""
+    passes: Annotated[Annotated[int, Field(ge=1, le=16)] | None, *AUTO] = None
+    """Of fit = "display": how often its weights are taken from the fit's own image. "auto": by
+    `auto.quality`."""
+    neighbours: Annotated[Annotated[float, Field(ge=0, le=1)] | None, *AUTO] = None
+    """Of fit = "display": weight of the neighbouring samples' views in the fit of a sample. "auto": 0.3 where
+    they are close, by `auto.quality`."""
     smoothness: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
     """Weight λ of differences between neighbouring texels: small fits the sampled view best, large survives
     longer away from it."""
@@ -248,8 +264,28 @@ class Infer(Section):
     """The solver stops when its gradient has shrunk to this fraction."""
 
 
+class Static(Section):
+    """[static]: the maps that serve views far from all samples: inferred from views of a dome around."""
+
+    views: Annotated[Annotated[int, Field(ge=0, le=10_000)] | None, *AUTO] = None
+    """Of the dome; 0: there are no such maps. "auto": by `auto.quality`."""
+    elevation: Annotated[tuple[Elevation, Elevation], BeforeValidator(as_tuple)] = (5.0, 60.0)
+    """Of the dome: the lowest and the highest above the horizon."""
+    beyond: Annotated[float, Field(ge=0, le=180)] = 25.0
+    """Degrees of azimuth that the dome goes on past those of the samples."""
+
+    @model_validator(mode="after")
+    def _rises(self) -> Static:
+        if self.elevation[0] > self.elevation[1]:
+            raise ValueError(f"elevation = {list(self.elevation)}: expected the lower one first")
+        return self
+
+
 class Auto(Section):
     """[auto]: what the values that are "auto" are decided by."""
+
+    quality: Literal["draft", "normal", "high"] = "normal"
+    """What a bake may cost: noise of targets, passes, neighbours' views, the static set."""
 
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.01
     """Relative RMS change of the object's picture that is worth no layer and no bounce."""
@@ -275,6 +311,7 @@ class SceneConfig(Section):
     maps: Maps = Maps()
     trace: Trace = Trace()
     infer: Infer = Infer()
+    static: Static = Static()
     auto: Auto = Auto()
 
     @model_validator(mode="before")
@@ -318,6 +355,7 @@ SECTIONS: Mapping[str, type[Section]] = {
     "maps": Maps,
     "trace": Trace,
     "infer": Infer,
+    "static": Static,
     "auto": Auto,
 }
 """Every section by its name."""

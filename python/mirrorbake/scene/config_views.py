@@ -7,15 +7,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from mirrorbake.scene.config_values import ImageSide, Section, Vec3, as_tuple
+from mirrorbake.scene.config_values import AUTO, ImageSide, Section, Vec3, as_tuple
 
-_DOME = {"degrees": 360.0, "count": 12}
-"""Defaults of a dome where they are not an arc's."""
+_DEFAULTS: Mapping[str, Mapping[str, float]] = {
+    "dome": {"degrees": 360.0, "count": 12},
+    "none": {"degrees": 360.0, "count": 64},
+}
+"""Of kinds of views where they are not an arc's."""
 
 _MEANINGLESS: Mapping[str, tuple[str, ...]] = {
     "arc": ("elevation", "rings"),
     "dome": ("height",),
     "fixed": ("elevation", "rings", "degrees", "count"),
+    "none": ("height", "rings", "traced"),
 }
 """Keys that a kind of views does not know."""
 
@@ -31,9 +35,11 @@ class Views(Section):
     `dome`: over a part of a sphere about `centre`, `count` azimuths by `rings` elevations.
 
     `fixed`: a single camera, where an arc would start.
+
+    `none`: no parameters. One set of maps is inferred from `count` views spread over a part of a sphere.
     """
 
-    kind: Literal["arc", "dome", "fixed"] = "arc"
+    kind: Literal["arc", "dome", "fixed", "none"] = "arc"
     centre: Vec3 | None = None
     """Default: the middle of the object's bounding box."""
     radius: Annotated[float, Field(gt=0, le=1e6)] | None = None
@@ -45,9 +51,12 @@ class Views(Section):
     degrees: Annotated[float, Field(ge=-360, le=360)] = 99.0
     """Length of the arc, or of the dome's azimuths, which close at 360. Default of domes: 360."""
     elevation: Annotated[tuple[Elevation, Elevation], BeforeValidator(as_tuple)] = (5.0, 60.0)
-    """Of a dome: the lowest and the highest above the horizon."""
+    """Of a dome, and of `none`: the lowest and the highest above the horizon."""
     count: Annotated[int, Field(ge=1, le=100_000)] = 100
-    """Maps along the arc, or along a ring of the dome (default there: 12)."""
+    """Maps along the arc, or along a ring of the dome (default there: 12); of `none`: views (default: 64)."""
+    traced: Annotated[Annotated[int, Field(ge=0, le=1000)] | None, *AUTO] = None
+    """Views between neighbouring maps that are traced, too, and fitted by what the maps' blend shows. "auto":
+    where the maps are far apart, by `auto.quality`."""
     rings: Annotated[int, Field(ge=1, le=1000)] = 3
     """Maps of a dome from its lowest to its highest elevation."""
     fov: Annotated[float, Field(gt=0, lt=180)] = 30.0
@@ -58,8 +67,8 @@ class Views(Section):
     @model_validator(mode="before")
     @classmethod
     def _defaults_of_domes(cls, data: Any) -> Any:
-        if isinstance(data, Mapping) and data.get("kind") == "dome":
-            return {**_DOME, **data}
+        if isinstance(data, Mapping) and data.get("kind") in _DEFAULTS:
+            return {**_DEFAULTS[data["kind"]], **data}
         return data
 
     @model_validator(mode="after")

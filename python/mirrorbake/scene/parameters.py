@@ -104,7 +104,7 @@ class ParameterSpace:
 
     def sample(self, index: int) -> Point:
         """Return the point of one node."""
-        places = self._places(index)
+        places = self.places(index)
         return tuple(axis.values[place] for axis, place in zip(self.axes, places, strict=True))
 
     def point(self, value: PointLike) -> Point:
@@ -154,7 +154,7 @@ class ParameterSpace:
         blend = []
         for corner in itertools.product(*places):
             weight = math.prod(share for _, share in corner)
-            blend.append((self._number([place for place, _ in corner]), weight))
+            blend.append((self.number([place for place, _ in corner]), weight))
         return blend
 
     def near(self, index: int, radius: int) -> list[int]:
@@ -166,14 +166,14 @@ class ParameterSpace:
         [0, 1]
         """
         ranges = []
-        for axis, place in zip(self.axes, self._places(index), strict=True):
+        for axis, place in zip(self.axes, self.places(index), strict=True):
             steps = range(place - radius, place + radius + 1)
             count = len(axis.values)
             if axis.period is None:
                 ranges.append([step for step in steps if 0 <= step < count])
             else:
                 ranges.append(sorted({step % count for step in steps}))
-        return [self._number(places) for places in itertools.product(*ranges)]
+        return [self.number(places) for places in itertools.product(*ranges)]
 
     def middle_after(self, index: int) -> Point | None:
         """Return the centre of the cell that a node begins: as far from maps as can be; None at an open end.
@@ -181,7 +181,7 @@ class ParameterSpace:
         An axis with a single node stays at it; None if all do.
         """
         middle = []
-        for axis, place in zip(self.axes, self._places(index), strict=True):
+        for axis, place in zip(self.axes, self.places(index), strict=True):
             cells = axis.cells() if len(axis.values) > 1 else [(axis.values[0], axis.values[0])]
             if place >= len(cells):
                 return None
@@ -204,7 +204,7 @@ class ParameterSpace:
         """
         views = []
         for number, cell in enumerate(itertools.product(*(axis.cells() for axis in self.axes))):
-            views += [self.view(point) for point in _jittered(cell, per_cell, (seed, number))]
+            views += [self.view(point) for point in jittered(cell, per_cell, (seed, number))]
         return views
 
     def spread(self, count: int) -> list[Point]:
@@ -270,12 +270,14 @@ class ParameterSpace:
             )
         )
 
-    def _places(self, index: int) -> tuple[int, ...]:
+    def places(self, index: int) -> tuple[int, ...]:
+        """Return the place of a node along every axis."""
         if not 0 <= index < len(self):
             raise IndexError(f"sample {index} of {len(self)}")
         return tuple(int(place) for place in np.unravel_index(index, self.shape)) if self.axes else ()
 
-    def _number(self, places: Sequence[int]) -> int:
+    def number(self, places: Sequence[int]) -> int:
+        """Return the number of the node at a place along every axis."""
         return int(np.ravel_multi_index(tuple(places), self.shape)) if self.axes else 0
 
 
@@ -303,7 +305,8 @@ def _wrapped(axis: Axis, value: float) -> float:
     return axis.values[0] + (value - axis.values[0]) % axis.period
 
 
-def _jittered(cell: Sequence[tuple[float, float]], count: int, seed: tuple[int, int]) -> list[Point]:
+def jittered(cell: Sequence[tuple[float, float]], count: int, seed: tuple[int, ...]) -> list[Point]:
+    """Return points of a cell, (low, high) along every axis, stratified by a shuffled Latin square."""
     generator = np.random.default_rng(seed)
     columns = [
         low + (generator.permutation(count) + generator.random(count)) / count * (high - low)
@@ -325,7 +328,7 @@ def space_of(config: SceneConfig) -> ParameterSpace:
 def _camera_axes(views: Views) -> list[Axis]:
     if views.kind == "arc":
         return [_unit_axis("arc", views.count)]
-    if views.kind == "fixed":
+    if views.kind in ("fixed", "none"):
         return []
     low, high = sorted((views.start, views.start + views.degrees))
     closed = abs(views.degrees) == 360.0

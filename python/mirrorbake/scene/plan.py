@@ -14,11 +14,16 @@ if TYPE_CHECKING:
 DECIDED_KEYS = (
     "trace.depth",
     "trace.samples",
+    "trace.noise",
     "layers.diffuse",
     "layers.local",
     "layers.hull_split",
     "maps.distant",
     "maps.size",
+    "views.traced",
+    "infer.passes",
+    "infer.neighbours",
+    "static.views",
 )
 """Keys of a scene file that may be "auto", in the order in which they are decided."""
 
@@ -31,7 +36,7 @@ class Decision:
     """Of the scene file: one of `DECIDED_KEYS`."""
     part: str | None
     """The part of the reflector that it is about; None: all."""
-    value: bool | int | str
+    value: bool | int | float | str
     automatic: bool
     """False: the scene file sets the value."""
     reason: str
@@ -60,7 +65,7 @@ class Plan:
     distant: dict[str, Any]
     """Proxy of the distant layer, as in a PEM's attributes."""
 
-    def value(self, key: str, part: str | None = None) -> bool | int | str:
+    def value(self, key: str, part: str | None = None) -> bool | int | float | str:
         """Return what was decided; KeyError for what was not."""
         for decision in self.decisions:
             if decision.key == key and decision.part in (None, part):
@@ -102,8 +107,19 @@ class Plan:
 
     def resolve(self, config: SceneConfig) -> SceneConfig:
         """Return the scene with what the tracing of its views needs in place of "auto"."""
-        trace = config.trace.model_copy(update={"samples": self.samples, "depth": self.depth})
-        return config.model_copy(update={"trace": trace})
+
+        def resolved(section: str, *names: str) -> Any:
+            values = {name: self.value(f"{section}.{name}") for name in names}
+            return getattr(config, section).model_copy(update=values)
+
+        return config.model_copy(
+            update={
+                "trace": resolved("trace", "samples", "noise", "depth"),
+                "views": resolved("views", "traced"),
+                "infer": resolved("infer", "passes", "neighbours"),
+                "static": resolved("static", "views"),
+            }
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values."""

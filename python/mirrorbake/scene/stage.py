@@ -35,8 +35,18 @@ class Stage:
         assert trace.samples is not None, "the scene has to be planned first"
         assert trace.depth is not None, "the scene has to be planned first"
         return _core.TraceOptions(
-            samples_per_pixel=trace.samples, max_specular_depth=trace.depth, seed=trace.seed
+            samples_per_pixel=trace.samples,
+            max_specular_depth=trace.depth,
+            seed=trace.seed,
+            noise=trace.noise or 0.0,
+            most_samples_per_pixel=max(trace.samples, trace.most_samples),
         )
+
+    def options_of(self, window: tuple[int, int, int, int]) -> _core.TraceOptions:
+        """Options of a part of a view: x, y, width and height in pixels; of no size: the whole."""
+        options = self.options
+        options.window = list(window)
+        return options
 
     def planned(self, plan: Plan) -> Stage:
         """Return the stage with what a plan decides in place of "auto", so that its views can be traced."""

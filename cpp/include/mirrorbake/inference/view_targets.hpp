@@ -29,8 +29,9 @@ class ViewTargets {
   int parts() const { return parts_; }
   int shells() const { return shells_; }
 
-  /// Traced samples of a pixel, those beside the reflector included.
-  double samples_per_pixel() const { return samples_per_pixel_; }
+  /// Share of a pixel's traced samples that see the reflector, or one of its parts.
+  float coverage(std::size_t pixel) const { return share(count(pixel), pixel); }
+  float coverage(std::size_t pixel, int part) const { return share(count(pixel, part), pixel); }
   /// Of a pixel that see a part.
   std::uint32_t count(std::size_t pixel, int part) const { return counts_[at(pixel, part)]; }
   std::uint32_t count(std::size_t pixel) const;
@@ -50,8 +51,12 @@ class ViewTargets {
     return pixel * static_cast<std::size_t>(parts_) + static_cast<std::size_t>(part);
   }
 
+  float share(std::uint32_t count, std::size_t pixel) const {
+    return traced_[pixel] == 0 ? 0.0F : static_cast<float>(count) / static_cast<float>(traced_[pixel]);
+  }
+
   int width_, height_, parts_, shells_;
-  double samples_per_pixel_ = 0.0;
+  std::vector<std::uint32_t> traced_;  // samples of a pixel, those beside the reflector included
   std::vector<std::uint32_t> counts_;
   std::vector<glm::dvec3> reflected_, diffuse_;
   std::vector<glm::dvec4> radiance_;

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mirrorbake import _core
-from mirrorbake.errors import OptionError
+from mirrorbake.errors import InputError, OptionError
 from mirrorbake.pem.shells import moved_proxy
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.pose import Pose
@@ -72,8 +72,19 @@ def footprint_scale(store: PemStore) -> float:
     return float(store.header.run_time["footprint_scale"])
 
 
+def require_cubes(store: PemStore) -> None:
+    """Raise InputError for a PEM whose maps are no cubes, which exports are made of."""
+    projection = store.header.projection
+    if projection != "cube":
+        raise InputError(
+            f'{store.location}: maps.projection = "{projection}": exports hold cube maps alone; '
+            'bake with maps.projection = "cube" to another folder'
+        )
+
+
 def static_set(store: PemStore) -> MapSet:
     """The set that needs no parameter: the captured surroundings, on the outermost shell's geometry."""
+    require_cubes(store)
     header = store.header
     proxy = header.static["proxy"] or header.static["infinite"]
     shell = ShellMap("static", proxy, header.map_size, _core.build_cube_pyramid(store.read_capture()))
@@ -88,6 +99,7 @@ def sample_set(store: PemStore, index: int) -> MapSet:
     OptionError
         There is no such sample.
     """
+    require_cubes(store)
     header = store.header
     count = len(header.space)
     if not 0 <= index < count:

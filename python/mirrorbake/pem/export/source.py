@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.pem.export.map_sets import require_cubes
 from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
 
@@ -72,7 +73,8 @@ class ExportSource:
 
 
 def export_source(pem: OpenedPem) -> ExportSource:
-    """Look at an opened PEM as the exporters do."""
+    """Look at an opened PEM as the exporters do; raises InputError if its maps are no cubes."""
+    require_cubes(pem.store)
     store, stage = pem.store, pem.stage
     header, built = store.header, stage.built
     parts = tuple(

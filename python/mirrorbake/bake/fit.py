@@ -1,0 +1,115 @@
+"""The joint display fit of a bake: maps of all shells and parts, from the pixels that will be shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.pem.run_time import model_of
+from mirrorbake.pem.store import SolverReport
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from mirrorbake.arrays import FloatArray
+    from mirrorbake.bake.targets import TracedView
+    from mirrorbake.pem.header import Header
+    from mirrorbake.scene.config import Infer
+    from mirrorbake.scene.pose import Pose
+
+
+@dataclass(frozen=True)
+class FitView:
+    """A traced view in a fit."""
+
+    view: TracedView
+    nodes: tuple[tuple[int, float], ...] = ((0, 1.0),)
+    """Of the fit whose maps are blended for it, with their weights."""
+    weight: float = 1.0
+    """Of its pixels."""
+
+
+def solve_options(infer: Infer) -> _core.SolveOptions:
+    """Return the solver's settings of a scene file."""
+    return _core.SolveOptions(
+        smoothness=infer.smoothness,
+        level_agreement=infer.level_agreement,
+        prior_weight=infer.prior_weight,
+        tolerance=infer.tolerance,
+        max_iterations=infer.iterations,
+    )
+
+
+class DisplayFitter:
+    """Fits the maps of a PEM's parts to views."""
+
+    def __init__(self, header: Header, infer: Infer, local_triangles: NDArray[np.uint8] | None) -> None:
+        self._header = header
+        self._model = model_of(header.run_time)
+        self._local_triangles = local_triangles
+        assert infer.passes is not None, "the scene has to be planned first"
+        self._options = _core.DisplayFitOptions(solve=solve_options(infer), passes=infer.passes)
+        self._numbers = {entry.name: number for number, entry in enumerate(header.maps)}
+
+    def captured_prior(self, capture: FloatArray) -> FloatArray:
+        """Return RGB of all maps (M, T, 3): a captured pyramid for those that hold the rest, else black."""
+        prior = np.zeros((len(self._numbers), self._header.topology.texels, 3), np.float32)
+        for part in self._header.parts:
+            for shell in part.shells:
+                if shell.rule == "rest":
+                    prior[self._numbers[shell.map]] = capture
+        return prior
+
+    def fit(
+        self, views: Sequence[FitView], pose: Pose, prior: FloatArray | None, nodes: int = 1
+    ) -> tuple[FloatArray, SolverReport]:
+        """Fit maps.
+
+        Parameters
+        ----------
+        views
+            What they should show.
+        pose
+            Where the object is.
+        prior
+            (M, T, 3), RGB of all maps, to which what no view determines falls back; None: a smooth fill.
+        nodes
+            How many sets of maps the views blend.
+
+        Returns
+        -------
+        tuple
+            (nodes, M, T, 4), premultiplied radiance and α; and how the last pass of the solver ended.
+        """
+        header = self._header
+        shells = [
+            [
+                _core.FitShell(
+                    shell.proxy_at(pose),
+                    self._numbers[shell.map],
+                    self._local_triangles if shell.polygons == "off hull" else None,
+                )
+                for shell in part.shells
+            ]
+            for part in header.parts
+        ]
+        texels, passes = _core.fit_display(
+            [
+                _core.DisplayView(one.view.lookups, one.view.targets, list(one.nodes), one.weight)
+                for one in views
+            ],
+            shells,
+            [header.topology] * len(self._numbers),
+            nodes,
+            run_time=self._model,
+            options=self._options,
+            prior=None if prior is None else np.concatenate([prior.reshape(-1, 3)] * nodes),
+        )
+        last = passes[-1]
+        report = SolverReport(last.iterations, float(last.relative_gradient), last.converged)
+        return np.asarray(texels).reshape(nodes, len(self._numbers), -1, 4), report

@@ -1,0 +1,103 @@
+"""Traced views, as the display fit takes them."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.pem.run_time import model_of
+from mirrorbake.pem.view_images import ViewImages, images_of_trace
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from mirrorbake.pem.header import Header
+    from mirrorbake.scene.parameters import Point
+    from mirrorbake.scene.stage import Stage
+
+    Window = tuple[int, int, int, int]
+
+BATCH = 1 << 22
+"""Samples that are held at a time, were the object to fill the frame."""
+KEPT_BYTES = 1 << 30
+"""Memory for views that later samples may need again."""
+TRACED_SHELLS = 2
+"""That the tracer tells apart: the object itself, and all else."""
+
+
+@dataclass(frozen=True)
+class TracedView:
+    """A view with the light that its maps should show."""
+
+    lookups: _core.SurfaceSamples
+    """Where the run time's lookups see the reflector."""
+    targets: _core.ViewTargets
+    images: ViewImages
+
+
+class ViewTracer:
+    """Traces the views of a planned stage for the run time of a PEM.
+
+    Views are a function of the scene and their camera alone. The last ones are kept, since neighbouring
+    samples see the same.
+    """
+
+    def __init__(self, stage: Stage, header: Header) -> None:
+        self._stage = stage
+        self._parts = len(header.parts)
+        self._places = model_of(header.run_time).places
+        width, height = stage.built.cameras.size
+        # Sums per pixel, part and shell, and lookups over a third of the frame.
+        size = width * height * (48 + self._parts * (4 + 56 * TRACED_SHELLS) + 60 * len(self._places))
+        self._most = max(KEPT_BYTES // size, 3)
+        self._kept: OrderedDict[Point, TracedView] = OrderedDict()
+
+    def at(self, point: Point) -> TracedView:
+        """Return the whole view of a point of the parameter space."""
+        if point in self._kept:
+            self._kept.move_to_end(point)
+            return self._kept[point]
+        while len(self._kept) >= self._most:
+            self._kept.popitem(last=False)
+        stage = self._stage.at(point)
+        self._kept[point] = self.trace(stage, stage.built.cameras.camera(point))
+        return self._kept[point]
+
+    def trace(self, stage: Stage, camera: _core.Camera) -> TracedView:
+        """Return the whole view of a camera, in the scene of a stage."""
+        targets = _core.ViewTargets(camera.width, camera.height, self._parts, TRACED_SHELLS)
+        bands = []
+        for y, traced in self._bands(stage, camera):
+            targets.add(traced.samples, 0, y)
+            bands.append(images_of_trace(traced))
+        images = ViewImages(
+            np.concatenate([band.object for band in bands]),
+            np.concatenate([band.coverage for band in bands]),
+            np.concatenate([band.background for band in bands]),
+        )
+        return TracedView(self._lookups(stage, camera, (0, 0, 0, 0)), targets, images)
+
+    def stripe(self, stage: Stage, camera: _core.Camera, window: Window) -> TracedView | None:
+        """Return what a part of a camera's view holds; None where it does not see the object."""
+        lookups = self._lookups(stage, camera, window)
+        if not len(lookups):
+            return None
+        traced = stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(window))
+        targets = _core.ViewTargets(window[2], window[3], self._parts, TRACED_SHELLS)
+        targets.add(traced.samples)
+        return TracedView(lookups, targets, images_of_trace(traced))
+
+    def _bands(self, stage: Stage, camera: _core.Camera) -> Iterator[tuple[int, _core.LayerTrace]]:
+        rows = max(1, BATCH // (camera.width * stage.options.samples_per_pixel))
+        for y in range(0, camera.height, rows):
+            window = (0, y, camera.width, min(rows, camera.height - y))
+            yield y, stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(window))
+
+    def _lookups(self, stage: Stage, camera: _core.Camera, window: Window) -> _core.SurfaceSamples:
+        return stage.tracer.trace_visibility(
+            camera, stage.built.reflector, stage.options_of(window), self._places
+        )

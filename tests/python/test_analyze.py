@@ -178,8 +178,11 @@ def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
         trace={"depth": 5},
     )
     plan = analyze(stage)
-    assert [decision.value for decision in plan.decisions] == [5, 4, True, True, False, "infinite", 32]
-    assert all(not decision.automatic and decision.reason == SET for decision in plan.decisions)
+    decided = [decision for decision in plan.decisions if not decision.automatic]
+    assert [decision.value for decision in decided] == [5, 4, True, True, False, "infinite", 32]
+    assert all(decision.reason == SET for decision in decided)
+    # What the quality decides needs no measuring.
+    assert all(decision.reason.startswith("normal quality") for decision in plan.decisions[len(decided) :])
     bake(stage.config, tmp_path / "pem", None, stage)
     pem = open_pem(tmp_path / "pem", stage)
     assert pem.store.header.map_names() == [("object", "local"), ("object", "distant")]
@@ -197,6 +200,7 @@ def test_layers_that_are_left_out_are_not_missed(tmp_path: Path) -> None:
             layers={"diffuse": wanted, "local": wanted},
             maps={"size": 32},
             views={"count": 1},
+            infer={"fit": "layers"},
         )
         bake(stage.config, tmp_path / name, None, stage)
         pem = open_pem(tmp_path / name, stage)

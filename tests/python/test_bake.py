@@ -34,7 +34,7 @@ SMALL = {
     "views": {"count": 3, "degrees": 2.0, "start": 22.0, "size": [160, 120]},
     "maps": {"size": 64},
     "trace": {"samples": 8, "indirect": "none"},
-    "auto": {"quality": "draft"},
+    "infer": {"fit": "layers"},
 }
 
 

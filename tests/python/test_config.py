@@ -27,9 +27,10 @@ def test_an_empty_scene_is_the_teapot_in_its_room_at_the_papers_size() -> None:
 
 
 def test_auto_is_a_value_of_every_key_that_is_decided_before_a_bake() -> None:
-    values: dict[str, bool | int | str] = {
+    values: dict[str, bool | int | float | str] = {
         "trace.depth": 3, "trace.samples": 2, "layers.diffuse": True,
         "layers.local": False, "layers.hull_split": True, "maps.distant": "rotated box", "maps.size": 64,
+        "trace.noise": 0.05, "views.traced": 1, "infer.passes": 3, "infer.neighbours": 0.5, "static.views": 8,
     }  # fmt: skip
     assert values.keys() == set(DECIDED_KEYS)
     for key, value in values.items():

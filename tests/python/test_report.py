@@ -89,8 +89,9 @@ def test_the_page_is_well_formed_and_needs_no_other_file(written: tuple[Path, st
 
 def test_the_page_says_what_was_measured_decided_and_spent(written: tuple[Path, str]) -> None:
     words = " ".join(Page(written[1]).words)
-    for title in TITLES.values():
-        assert title in words
+    for name, title in TITLES.items():
+        # A draft has no static set.
+        assert (title in words) == (name != "static_set")
     for expected in (
         *("ceiling", "trace.depth", "set in the scene", "maps.size", "solving", "a view"),
         *("half-way between two", "10° above the arc", "numpy", "FLIP", "Seen pem"),

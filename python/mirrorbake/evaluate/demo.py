@@ -33,6 +33,8 @@ def demo_config() -> SceneConfig:
             "trace": {"samples": 16},
             # What the page draws is what the maps are inferred for.
             "infer": {"fit": "display", "run_time": "Web"},
+            # It would take longer than all else here.
+            "static": {"views": 0},
         },
         "demo",
     )

@@ -67,9 +67,9 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
     for (int column = 0; column < samples.width; ++column) {
       const auto from = static_cast<std::size_t>(row) * static_cast<std::size_t>(samples.width) +
                         static_cast<std::size_t>(column);
-      const auto to = (static_cast<std::size_t>(y) + static_cast<std::size_t>(row)) *
-                          static_cast<std::size_t>(width_) +
-                      static_cast<std::size_t>(x) + static_cast<std::size_t>(column);
+      const auto to =
+          (static_cast<std::size_t>(y) + static_cast<std::size_t>(row)) * static_cast<std::size_t>(width_) +
+          static_cast<std::size_t>(x) + static_cast<std::size_t>(column);
       traced_[to] += samples.samples_in(from);
     }
   }

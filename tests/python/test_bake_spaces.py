@@ -278,7 +278,6 @@ def test_maps_are_fitted_to_the_display_in_every_kind_of_scene(name: str, tmp_pa
         )
         for contender in ("pem", "static_infinite")
     }
-    print(name, drawn)
     # A coat reflects a twentieth of the light, so that what it reflects counts less.
     assert drawn["pem"] > drawn["static_infinite"] + (1.0 if name == "diffuse under a coat" else 5.0)
     assert drawn["pem"] > 24.0
@@ -372,5 +371,4 @@ def test_a_static_set_alone_has_no_parameters(tmp_path: Path) -> None:
         for name in ("pem", "static_infinite")
     }
     # The view that a PEM keeps lies in the middle of the dome and is none of those that it is inferred from.
-    print("none", drawn)
     assert drawn["pem"] > drawn["static_infinite"] + 1.0

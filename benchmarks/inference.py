@@ -37,7 +37,7 @@ def cases() -> Iterator[Case]:
 
     layout = core.CubePyramidLayout(128)
     matrix = core.build_rendering_matrix(samples, 0, core.Proxy.infinite(), layout)
-    target = matrix.average(np.asarray(samples.shells[1].radiance)[:, :3])
+    target = matrix.row_means(np.asarray(samples.shells[1].radiance)[:, :3])
     peer = scipy.sparse.csr_array(
         (matrix.weights, matrix.texels.astype(np.int32), matrix.row_offsets.astype(np.int32)),
         shape=(matrix.rows, matrix.columns),

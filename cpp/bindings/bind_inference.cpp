@@ -123,7 +123,7 @@ void bind_inference(nb::module_& m) {
           },
           nb::rv_policy::move, "uint32 (rows,): how many samples of the pixel see the part.")
       .def(
-          "average",
+          "row_means",
           [](const RenderingMatrix& self, Matrix values) {
             std::vector<float> target;
             {

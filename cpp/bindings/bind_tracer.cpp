@@ -208,12 +208,12 @@ void bind_tracer(nb::module_& m) {
                    "LayerTrace"),
            "Layers of object number `reflector`, whose material must be specular.")
       .def(
-          "trace_layers_of",
+          "trace_layers",
           [](const Tracer& tracer, const Camera& camera, const std::vector<int>& reflectors,
              const TraceOptions& options) { return tracer.trace_layers(camera, reflectors, options); },
           nb::arg("camera"), nb::arg("reflectors"), nb::arg("options") = TraceOptions{},
           nb::call_guard<nb::gil_scoped_release>(),
-          nb::sig("def trace_layers_of(self, camera: Camera, reflectors: collections.abc.Sequence[int], "
+          nb::sig("def trace_layers(self, camera: Camera, reflectors: collections.abc.Sequence[int], "
                   "options: TraceOptions = ...) -> list[LayerTrace]"),
           "Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as "
           "trace_layers gives.")

@@ -1185,10 +1185,12 @@ class Tracer:
         most options.samples_per_pixel.
         """
 
+    @overload
     def trace_layers(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> LayerTrace:
         """Layers of object number `reflector`, whose material must be specular."""
 
-    def trace_layers_of(self, camera: Camera, reflectors: Sequence[int], options: TraceOptions = ...) -> list[LayerTrace]:
+    @overload
+    def trace_layers(self, camera: Camera, reflectors: Sequence[int], options: TraceOptions = ...) -> list[LayerTrace]:
         """
         Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as trace_layers gives.
         """
@@ -1375,7 +1377,7 @@ def convert_convention(layout: EnvMapLayout, values: Annotated[NDArray[numpy.flo
 
 def load_envmap(path: str | os.PathLike[str], projection: str | None = None, faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic') -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]:
     """
-    Layout, values and names of the channels of a map in an image or KTX2 file.
+    Layout, values and names of the channels of a map in an image, KTX2 or DDS file.
     """
 
 def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') -> NDArray[numpy.float32]:
@@ -1386,7 +1388,7 @@ def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '')
     """
 
 def save_envmap(path: str | os.PathLike[str], layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], channels: Sequence[str], faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic', format: Literal['automatic', 'half', 'float32', 'uint8', 'uint16'] = 'automatic') -> SaveReport:
-    """Write the finest level as an image, or all levels as KTX2."""
+    """Write the finest level as an image, or all levels as KTX2 or DDS."""
 
 class Comparison:
     """How two maps differ, texels weighted by solid angle."""
@@ -1532,7 +1534,7 @@ class RenderingMatrix:
     def row_samples(self) -> NDArray[numpy.uint32]:
         """uint32 (rows,): how many samples of the pixel see the part."""
 
-    def average(self, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+    def row_means(self, values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """
         Mean of per-sample values, float32 (samples, C), over each row's samples: float32 (rows, C).
         """

@@ -93,7 +93,7 @@ def test_multiply_is_the_sparse_product(matrix: mb.RenderingMatrix) -> None:
 
 def test_average_is_the_mean_of_the_row(trace: mb.LayerTrace, matrix: mb.RenderingMatrix) -> None:
     pixel = np.asarray(trace.samples.pixel, np.float32)[:, None]
-    np.testing.assert_array_equal(matrix.average(pixel)[:, 0], matrix.row_pixels)
+    np.testing.assert_array_equal(matrix.row_means(pixel)[:, 0], matrix.row_pixels)
 
 
 def test_renderer_draws_what_the_matrix_says(trace: mb.LayerTrace, matrix: mb.RenderingMatrix) -> None:
@@ -108,7 +108,7 @@ def test_renderer_draws_what_the_matrix_says(trace: mb.LayerTrace, matrix: mb.Re
 def test_inferred_map_reproduces_the_traced_reflection(
     trace: mb.LayerTrace, matrix: mb.RenderingMatrix
 ) -> None:
-    target = matrix.average(np.asarray(trace.samples.shells[1].radiance)[:, :3])
+    target = matrix.row_means(np.asarray(trace.samples.shells[1].radiance)[:, :3])
     weights = mb.display_row_weights(matrix, SAMPLES, target)
     assert weights.shape == (matrix.rows, 3)
     texels, report = solver_of(matrix).solve([target], [weights])

@@ -62,7 +62,7 @@ def test_a_traced_view_is_solved_to_the_best_map_within_the_bounds(samples: mb.S
     matrix, a, topology = system(samples, 32)
     incident = np.asarray(samples.shells[1].radiance)[:, :3]
     # Pixels that are darker than any map could show force texels onto their bound.
-    target = (matrix.average(np.ascontiguousarray(incident)) - 0.2).astype(np.float32)
+    target = (matrix.row_means(np.ascontiguousarray(incident)) - 0.2).astype(np.float32)
     prior = np.full((topology.texels, 3), 0.1, np.float32)
     options = mb.SolveOptions(**NOTHING_ELSE, prior_weight=1e-3, tolerance=1e-5, max_iterations=5000)
     texels, report = solve(matrix, topology, target, prior, options)
@@ -122,6 +122,6 @@ def test_the_same_bits_come_from_any_number_of_threads(samples: mb.SurfaceSample
     results = []
     for threads in (1, 2, 3):
         with mb.ThreadLimit(threads):
-            results.append(solve(matrix, topology, matrix.average(incident), prior, mb.SolveOptions())[0])
+            results.append(solve(matrix, topology, matrix.row_means(incident), prior, mb.SolveOptions())[0])
     np.testing.assert_array_equal(results[0], results[1])
     np.testing.assert_array_equal(results[0], results[2])

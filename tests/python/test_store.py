@@ -550,11 +550,11 @@ def test_the_fingerprint_covers_what_was_decided(tmp_path: Path) -> None:
 
 
 def test_a_plan_without_one_of_its_decisions_is_damaged() -> None:
-    data = make_plan().to_json()
-    assert Plan.from_json(data) == make_plan()
+    data = make_plan().to_dict()
+    assert Plan.from_dict(data) == make_plan()
     del data["decisions"][0]
     with pytest.raises(KeyError, match=r"trace\.depth"):
-        Plan.from_json(data)
+        Plan.from_dict(data)
 
 
 def test_two_bakes_cannot_write_to_one_folder(tmp_path: Path) -> None:

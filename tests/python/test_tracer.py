@@ -90,7 +90,7 @@ def test_several_reflectors_are_traced_in_one_call() -> None:
     ball = scene.add_object("ball", _core.make_sphere((1, 0.5, 0), 0.4, 24), scene.object_material(ring))
     tracer = Tracer(scene, TracerOptions(indirect="none"))
     options = TraceOptions(samples_per_pixel=4)
-    together = tracer.trace_layers_of(CAMERA, [ring, ball], options)
+    together = tracer.trace_layers(CAMERA, [ring, ball], options)
     assert len(together) == 2
     for reflector, trace in zip((ring, ball), together, strict=True):
         assert len(trace.samples) > 20
@@ -99,7 +99,7 @@ def test_several_reflectors_are_traced_in_one_call() -> None:
         # The beauty adds the terms of the other reflector's samples in another order.
         np.testing.assert_allclose(trace.layers, alone.layers, rtol=1e-5, atol=1e-6)
     with pytest.raises(_core.InvalidArgument, match="reflectors"):
-        tracer.trace_layers_of(CAMERA, [ring, ring], options)
+        tracer.trace_layers(CAMERA, [ring, ring], options)
 
 
 def test_a_window_is_a_part_of_the_image(tracer: Tracer) -> None:

@@ -363,7 +363,7 @@ def test_analyze_prints_exactly_what_a_bake_with_the_same_options_does(tmp_path:
     for line in lines:
         assert line in baked.stderr.splitlines()
     printed = run("analyze", scene, *options, "--json")
-    assert json.loads(printed.stdout) == PemStore.open(tmp_path / "pem").header.plan.to_json()
+    assert json.loads(printed.stdout) == PemStore.open(tmp_path / "pem").header.plan.to_dict()
 
 
 def test_one_and_two_threads_bake_the_same_bits(tmp_path: Path) -> None:

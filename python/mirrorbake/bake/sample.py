@@ -152,7 +152,7 @@ class SampleBaker:
                     )
                     if matrix.rows:
                         matrices.append(matrix)
-                        targets.append(matrix.average(_incident(trace.samples, part, shell)))
+                        targets.append(matrix.row_means(_incident(trace.samples, part, shell)))
             middle = time.perf_counter()
             texels, report = self._infer_layer(matrices, targets, prior, entry.channels)
             maps.update(dict.fromkeys(readers, texels))

@@ -44,7 +44,7 @@ def analyze_command(
     with _core.ThreadLimit(threads):
         plan = analyze(prepare_stage(config))
     if json:
-        typer.echo(json_module.dumps(plan.to_json(), indent=1))
+        typer.echo(json_module.dumps(plan.to_dict(), indent=1))
         return
     for line in plan.lines():
         typer.echo(line)

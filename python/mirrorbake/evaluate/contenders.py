@@ -194,7 +194,7 @@ class SingleLayer:
             if matrix.rows == 0:
                 maps.append(np.asarray(self._capture))
                 continue
-            target = matrix.average(incident)
+            target = matrix.row_means(incident)
             weights = _core.display_row_weights(matrix, stage.options.samples_per_pixel, target)
             solver = _core.MapSolver([(matrix, [(0, 1.0)])], [self._topology], options=self._solve)
             maps.append(np.asarray(solver.solve([target], [weights], self._capture, self._capture)[0]))

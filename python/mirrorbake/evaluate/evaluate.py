@@ -274,7 +274,7 @@ def evaluate(
             "display_transform": DISPLAY_TRANSFORM,
             "mask": "pixels that the object covers wholly",
             "config": source.config,
-            "plan": pem.store.header.plan.to_json(),
+            "plan": pem.store.header.plan.to_dict(),
             "inputs": source.inputs,
         },
         notes,

@@ -114,7 +114,7 @@ class Header:
     @property
     def fingerprint(self) -> str:
         """Changes with everything that decides what a bake computes: its source and its plan."""
-        text = json.dumps([self.source.fingerprint, self.plan.to_json(), self.run_time], sort_keys=True)
+        text = json.dumps([self.source.fingerprint, self.plan.to_dict(), self.run_time], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_attributes(self) -> dict[str, Any]:
@@ -145,7 +145,7 @@ class Header:
             "run_time": self.run_time,
             "record": list(self.record_columns),
             "config": self.source.config,
-            "plan": self.plan.to_json(),
+            "plan": self.plan.to_dict(),
             "inputs": self.source.inputs,
             "provenance": provenance(),
         }
@@ -164,7 +164,7 @@ class Header:
         )
         return Header(
             source=Source(attributes["library"], attributes["config"], attributes["inputs"]),
-            plan=Plan.from_json(attributes["plan"]),
+            plan=Plan.from_dict(attributes["plan"]),
             space=ParameterSpace.from_attributes(attributes["space"]),
             parts=tuple(parts),
             static=attributes["static"],

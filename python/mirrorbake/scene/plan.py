@@ -121,13 +121,13 @@ class Plan:
             }
         )
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return {"decisions": [asdict(decision) for decision in self.decisions], "distant": self.distant}
 
     @staticmethod
-    def from_json(data: Mapping[str, Any]) -> Plan:
-        """Inverse of `to_json`. Raises KeyError or TypeError for what is not one."""
+    def from_dict(data: Mapping[str, Any]) -> Plan:
+        """Inverse of `to_dict`. Raises KeyError or TypeError for what is not one."""
         plan = Plan(tuple(Decision(**decision) for decision in data["decisions"]), data["distant"])
         for key in DECIDED_KEYS:
             if all(decision.key != key for decision in plan.decisions):

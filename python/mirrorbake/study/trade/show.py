@@ -37,7 +37,7 @@ def words_of(trial: Trial) -> str:
 
 def as_json(result: Study) -> dict[str, Any]:
     """Return plain values of all that was measured, with the fronts and the advice."""
-    trials = [trial.to_json() for trial in result.all]
+    trials = [trial.to_dict() for trial in result.all]
     return {"trials": trials, **summary(result), "planned": result.planned, "refused": result.refused}
 
 

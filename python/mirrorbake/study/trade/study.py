@@ -223,7 +223,7 @@ class _Notebook:
             data = json.loads(path.read_text(encoding="utf-8"))
             if data["identity"] != identity:
                 raise InputError(f"{path}: a study of another scene; give another folder with --out")
-            trials = [Trial.from_json(trial) for trial in data["trials"]]
+            trials = [Trial.from_dict(trial) for trial in data["trials"]]
             self.refused = dict(data["refused"])
         except (OSError, ValueError, KeyError, TypeError) as failure:
             if isinstance(failure, InputError):
@@ -253,7 +253,7 @@ class _Notebook:
         data = {
             "identity": self._identity,
             "library": _core.version(),
-            "trials": [trial.to_json() for trial in self._trials.values()],
+            "trials": [trial.to_dict() for trial in self._trials.values()],
             "refused": self.refused,
             **(results or {}),
         }

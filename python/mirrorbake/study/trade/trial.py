@@ -59,13 +59,13 @@ class Trial:
         values = [value for place in ("on", "between") if (value := self.psnr.get(place)) is not None]
         return sum(values) / len(values) if values else None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return asdict(self)
 
     @staticmethod
-    def from_json(data: Mapping[str, Any]) -> Trial:
-        """Inverse of `to_json`. Raises TypeError for what is not one."""
+    def from_dict(data: Mapping[str, Any]) -> Trial:
+        """Inverse of `to_dict`. Raises TypeError for what is not one."""
         return Trial(**data)
 
 

@@ -9,6 +9,7 @@
 #include "mirrorbake/envmap/cube_pyramid.hpp"
 #include "mirrorbake/envmap/reads.hpp"
 #include "mirrorbake/image/image_io.hpp"
+#include "mirrorbake/prefilter/convolve.hpp"
 #include "mirrorbake/scene/shapes.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
@@ -36,6 +37,12 @@ int main() {
   double radiance = 0.0;
   for (const auto& read : reads) radiance += read.weight * pyramid[read.texel];
   expect("radiance of a uniform environment", radiance, 3.0, 1e-5);
+
+  // A white world lights a white surface with π.
+  mirrorbake::EnvMap white = mirrorbake::make_envmap({{mirrorbake::ProjectionKind::latlong}, 64, 32, 1, 1});
+  for (float& value : white.values) value = 1.0F;
+  const mirrorbake::EnvMap lit = mirrorbake::irradiance(white, {{}, 4, 4});
+  expect("irradiance of a white world", lit.values.front(), 3.14159265, 2e-3);
 
   // A ray from the middle of a box of two metres meets its wall after one.
   mirrorbake::Scene scene;

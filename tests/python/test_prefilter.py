@@ -9,6 +9,7 @@ import pytest
 
 from mirrorbake import InvalidArgument
 from mirrorbake.envmap import EnvMap
+from mirrorbake.errors import InputError
 from mirrorbake.prefilter import (
     Harmonics,
     Prefilter,
@@ -109,6 +110,23 @@ def test_harmonics_go_through_json_and_to_three_js(sky: EnvMap) -> None:
         Harmonics.from_json("{}")
     with pytest.raises(InvalidArgument, match=r"\(16, 3\)"):
         Harmonics.project(sky, 3).three_js()
+
+
+def test_harmonics_go_through_files(sky: EnvMap, tmp_path: Path) -> None:
+    light = Harmonics.project(sky, 3)
+    light.save(tmp_path / "light.json")
+    np.testing.assert_array_equal(Harmonics.load(tmp_path / "light.json").coefficients, light.coefficients)
+    light.save(tmp_path / "light.exr")
+    again = Harmonics.load(tmp_path / "light.exr").coefficients
+    np.testing.assert_array_equal(again, light.coefficients.astype(np.float32))
+    EnvMap.from_array(np.ones((1, 5, 3), np.float32), "latlong").save(tmp_path / "five.exr")
+    with pytest.raises(InvalidArgument, match="order"):
+        Harmonics.load(tmp_path / "five.exr")
+    sky.save(tmp_path / "sky.exr")
+    with pytest.raises(InvalidArgument, match="64 rows"):
+        Harmonics.load(tmp_path / "sky.exr")
+    with pytest.raises(InputError, match=r"none\.json"):
+        Harmonics.load(tmp_path / "none.json")
 
 
 def test_error_map_is_nine_coefficients_against_all_texels(sky: EnvMap) -> None:

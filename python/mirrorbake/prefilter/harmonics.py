@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from os import fspath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,11 +13,17 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.arrays import real_array
 from mirrorbake.envmap import EnvMap
+from mirrorbake.files import read_text, write_text
 from mirrorbake.prefilter.convolve import irradiance
 from mirrorbake.resample import height_and_width
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from numpy.typing import ArrayLike, NDArray
+
+
+_LARGEST_JSON = 1 << 20  # bytes: 81 rows take a hundredth of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +138,39 @@ class Harmonics:
                 f"text has no coefficients ({error!r}), expected JSON of Harmonics"
             ) from None
         return cls.from_array(coefficients)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the coefficients: to a ``.json``, or to an image as a row of (order + 1)² texels in float32.
+
+        Raises
+        ------
+        FileError
+            If the path cannot be written.
+        """
+        if fspath(path).lower().endswith(".json"):
+            write_text(Path(path), self.to_json())
+        else:
+            EnvMap.from_array(self.coefficients[None], "latlong").save(path, format="float32")
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Harmonics:
+        """Read what `save` and ``mb-envmap prefilter --model sh`` write: JSON, or a row of coefficients.
+
+        Raises
+        ------
+        InputError, FileError
+            If there is no such file, or it is damaged: of JSON the first, of an image the second.
+        InvalidArgument
+            It has no such coefficients, or a number of them that is not (order + 1)².
+        """
+        if fspath(path).lower().endswith(".json"):
+            return cls.from_json(read_text(Path(path), at_most=_LARGEST_JSON))
+        row = EnvMap.load(path, "latlong").level()
+        if row.shape[0] != 1:
+            raise _core.InvalidArgument(
+                f"{fspath(path)} has {row.shape[0]} rows, expected one of coefficients"
+            )
+        return cls.from_array(row[0])
 
     def error_map(self, envmap: EnvMap, size: int | tuple[int, int], projection: str = "cube") -> EnvMap:
         """Error of the irradiance of these harmonics of radiance against the exact one, by texel."""

@@ -4,6 +4,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <memory>
@@ -312,16 +313,18 @@ void bind_scene(nb::module_& m) {
       .def(
           "add_object",
           [](Scene& scene, std::string name, const TriangleMesh& mesh, int material,
-             std::vector<std::string> part_names, Visibility visibility) {
+             std::vector<std::string> part_names, Visibility visibility, std::vector<int> part_materials) {
             element(scene.materials, "material", material);
-            return append(scene.objects,
-                          Object{std::move(name), mesh, material, std::move(part_names), visibility});
+            for (const int index : part_materials) element(scene.materials, "part_materials", index);
+            return append(scene.objects, Object{std::move(name), mesh, material, std::move(part_names),
+                                                visibility, std::move(part_materials)});
           },
           nb::arg("name"), nb::arg("mesh"), nb::arg("material"),
           nb::arg("part_names") = std::vector<std::string>{}, nb::arg("visibility") = Visibility::all,
+          nb::arg("part_materials") = std::vector<int>{},
           "Add a copy of a mesh, in world space, with the material of that index. `part_names` names its "
           "parts, if it\n"
-          "has more than one.")
+          "has more than one; `part_materials` gives each a material of its own.")
       .def(
           "add_rectangle_light",
           [](Scene& scene, glm::vec3 corner, glm::vec3 edge_u, glm::vec3 edge_v, glm::vec3 radiance) {
@@ -374,6 +377,21 @@ void bind_scene(nb::module_& m) {
           "along −Z, +X is to the right of the centre, +Y is the top row. It is multiplied with `scale` and "
           "turned\n"
           "counter-clockwise about +Y, seen from above.")
+      .def(
+          "add_materials", [](Scene& scene, const Scene& other) { return add_materials(scene, other); },
+          nb::arg("other"),
+          "Add copies of another scene's textures and materials; returns the index of the first material.")
+      .def(
+          "join_objects",
+          [](const Scene& scene, std::size_t most_parts) {
+            Object joined = join_objects(scene, "joined", most_parts);
+            return std::tuple(std::move(joined.mesh), std::move(joined.part_names),
+                              std::move(joined.part_materials));
+          },
+          nb::arg("most_parts"),
+          "All objects in one mesh: (mesh, part names, index of each part's material). A part is an object, "
+          "or, if\n"
+          "there are more than `most_parts`, what is of one material.")
       .def_prop_ro("object_names", [](const Scene& scene) { return names(scene.objects); })
       .def_prop_ro("material_names", [](const Scene& scene) { return names(scene.materials); })
       .def(
@@ -385,13 +403,23 @@ void bind_scene(nb::module_& m) {
           [](const Scene& scene, int object) { return element(scene.objects, "object", object).material; },
           nb::arg("object"), "Index of an object's material.")
       .def(
+          "object_part_materials",
+          [](const Scene& scene, int object) {
+            const Object& o = element(scene.objects, "object", object);
+            if (!o.part_materials.empty()) return o.part_materials;
+            return std::vector<int>(std::max<std::size_t>(1, o.part_names.size()), o.material);
+          },
+          nb::arg("object"), "Index of the material of each part of an object.")
+      .def(
           "set_object_material",
           [](Scene& scene, int object, int material) {
             element(scene.objects, "object", object);
             element(scene.materials, "material", material);
             scene.objects[static_cast<std::size_t>(object)].material = material;
+            scene.objects[static_cast<std::size_t>(object)].part_materials.clear();
           },
-          nb::arg("object"), nb::arg("material"), "Give an object the material of that index.")
+          nb::arg("object"), nb::arg("material"),
+          "Give an object, all its parts, the material of that index.")
       .def(
           "object_part_names",
           [](const Scene& scene, int object) {

@@ -72,6 +72,7 @@ void bind_samples(nb::module_& m) {
   def_vectors<&S::dreflection_dy>(c, "dreflection_dy", "(n, 3): change of `reflection` per pixel down.");
   def_vectors<&S::fresnel>(c, "fresnel", "(n, 3): Fresnel reflectance F of the first bounce.");
   def_vectors<&S::albedo>(c, "albedo", "(n, 3): diffuse albedo, times (1 - F) under a coat.");
+  def_vectors<&S::emission>(c, "emission", "(n, 3): radiance of the surface's own; (0, 3): none.");
   def_vectors<&S::diffuse>(c, "diffuse", "(n, 3): radiance D that the body reflects and emits.");
   c.def_prop_ro(
       "shells",

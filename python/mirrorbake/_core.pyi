@@ -681,10 +681,10 @@ class Scene:
     def add_material(self, material: Material) -> int:
         """Add a copy of a material."""
 
-    def add_object(self, name: str, mesh: TriangleMesh, material: int, part_names: Sequence[str] = [], visibility: Visibility = Visibility.all) -> int:
+    def add_object(self, name: str, mesh: TriangleMesh, material: int, part_names: Sequence[str] = [], visibility: Visibility = Visibility.all, part_materials: Sequence[int] = []) -> int:
         """
         Add a copy of a mesh, in world space, with the material of that index. `part_names` names its parts, if it
-        has more than one.
+        has more than one; `part_materials` gives each a material of its own.
         """
 
     def add_rectangle_light(self, corner: Sequence[float], edge_u: Sequence[float], edge_v: Sequence[float], radiance: Sequence[float]) -> int:
@@ -717,6 +717,17 @@ class Scene:
         counter-clockwise about +Y, seen from above.
         """
 
+    def add_materials(self, other: Scene) -> int:
+        """
+        Add copies of another scene's textures and materials; returns the index of the first material.
+        """
+
+    def join_objects(self, most_parts: int) -> tuple[TriangleMesh, list[str], list[int]]:
+        """
+        All objects in one mesh: (mesh, part names, index of each part's material). A part is an object, or, if
+        there are more than `most_parts`, what is of one material.
+        """
+
     @property
     def object_names(self) -> list[str]: ...
 
@@ -729,8 +740,11 @@ class Scene:
     def object_material(self, object: int) -> int:
         """Index of an object's material."""
 
+    def object_part_materials(self, object: int) -> list[int]:
+        """Index of the material of each part of an object."""
+
     def set_object_material(self, object: int, material: int) -> None:
-        """Give an object the material of that index."""
+        """Give an object, all its parts, the material of that index."""
 
     def object_part_names(self, object: int) -> list[str]:
         """Names of an object's parts; its own if it has only one."""
@@ -917,6 +931,10 @@ class SurfaceSamples:
     @property
     def albedo(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
         """(n, 3): diffuse albedo, times (1 - F) under a coat."""
+
+    @property
+    def emission(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(n, 3): radiance of the surface's own; (0, 3): none."""
 
     @property
     def diffuse(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:

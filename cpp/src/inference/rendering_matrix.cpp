@@ -23,6 +23,8 @@ void group_by_pixel(const SurfaceSamples& samples, const SampleSelection& select
   matrix.member_offsets.push_back(0);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (samples.part[i] != selection.part) continue;
+    // What a matte surface does not mirror says nothing about the maps.
+    if (!samples.fresnel.empty() && samples.fresnel[i] == glm::vec3(0.0F)) continue;
     if (!selection.triangles.empty()) {
       if (samples.triangle[i] >= selection.triangles.size()) {
         throw InvalidArgument("triangles", std::to_string(selection.triangles.size()) + " entries",

@@ -121,6 +121,7 @@ std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
       const glm::vec3 irradiance = (1.0F - b.x - b.y) * vertex_irradiance[triangle.x] +
                                    b.x * vertex_irradiance[triangle.y] + b.y * vertex_irradiance[triangle.z];
       diffuse[i] = samples.albedo[i] * irradiance * std::numbers::inv_pi_v<float>;
+      if (!samples.emission.empty()) diffuse[i] += samples.emission[i];
     }
   });
   return diffuse;

@@ -228,7 +228,19 @@ void check_object(const Scene& scene, std::size_t index) {
     throw InvalidArgument(where + " material", std::to_string(object.material),
                           "an index below " + std::to_string(scene.materials.size()));
   }
-  check_mesh(where, object.mesh, std::max<std::size_t>(1, object.part_names.size()));
+  const std::size_t parts = std::max<std::size_t>(1, object.part_names.size());
+  if (!object.part_materials.empty() && object.part_materials.size() != parts) {
+    throw InvalidArgument(where + " part material count", std::to_string(object.part_materials.size()),
+                          "0 or the number of parts " + std::to_string(parts));
+  }
+  for (std::size_t i = 0; i < object.part_materials.size(); ++i) {
+    if (object.part_materials[i] >= 0 && object.part_materials[i] < static_cast<int>(scene.materials.size()))
+      continue;
+    throw InvalidArgument(where + " material of part " + std::to_string(i),
+                          std::to_string(object.part_materials[i]),
+                          "an index below " + std::to_string(scene.materials.size()));
+  }
+  check_mesh(where, object.mesh, parts);
 }
 
 void check_position(const std::string& where, glm::vec3 position) {

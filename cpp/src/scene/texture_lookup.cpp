@@ -87,6 +87,33 @@ bool has_gaps(const Material& material) {
   return material.opacity_texture.texture >= 0 || material.opacity < material.opacity_cutoff.value_or(1.0F);
 }
 
+std::vector<int> materials_of(const Object& object) {
+  std::vector<int> materials = object.part_materials;
+  if (materials.empty()) return {object.material};
+  std::sort(materials.begin(), materials.end());
+  materials.erase(std::unique(materials.begin(), materials.end()), materials.end());
+  return materials;
+}
+
+namespace {
+
+template <typename Test>
+bool any_material(const Scene& scene, const Object& object, const Test& test) {
+  const std::vector<int> materials = materials_of(object);
+  return std::any_of(materials.begin(), materials.end(),
+                     [&](int index) { return test(scene.materials[static_cast<std::size_t>(index)]); });
+}
+
+}  // namespace
+
+bool is_specular(const Scene& scene, const Object& object) {
+  return any_material(scene, object, [](const Material& material) { return material.specular; });
+}
+
+bool has_gaps(const Scene& scene, const Object& object) {
+  return any_material(scene, object, [](const Material& material) { return has_gaps(material); });
+}
+
 float opacity_at(const Scene& scene, const Material& material, glm::vec2 uv) {
   float opacity = material.opacity;
   if (material.opacity_texture.texture >= 0) opacity *= texture_lookup(scene, material.opacity_texture, uv).x;

@@ -79,9 +79,10 @@ class SpecularTriangles {
     for (std::uint32_t o = 0; o < world.scene.objects.size(); ++o) {
       const Object& object = world.scene.objects[o];
       const bool is_seen = (object.visibility & Visibility::reflection) != Visibility::none;
-      if (!is_seen || !world.scene.materials[static_cast<std::size_t>(object.material)].specular) continue;
+      if (!is_seen || !is_specular(world.scene, object)) continue;
       const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(o));
       for (std::uint32_t t = 0; t < object.mesh.triangles.size(); ++t) {
+        if (!world.scene.materials[static_cast<std::size_t>(material_of(object, t))].specular) continue;
         const glm::uvec3 c = object.mesh.triangles[t];
         const glm::dvec3 a = p[c.x];
         areas.push_back(0.5 * glm::length(glm::cross(glm::dvec3(p[c.y]) - a, glm::dvec3(p[c.z]) - a)));

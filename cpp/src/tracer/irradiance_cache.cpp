@@ -41,7 +41,12 @@ void IrradianceCache::assign_slots(const World& world) {
   std::uint32_t slots = 0;
   for (std::size_t o = 0; o < world.scene.objects.size(); ++o) {
     const Object& object = world.scene.objects[o];
-    if (world.scene.materials[static_cast<std::size_t>(object.material)].albedo == glm::vec3(0.0F)) continue;
+    const std::vector<int> materials = materials_of(object);
+    if (std::all_of(materials.begin(), materials.end(), [&](int material) {
+          return world.scene.materials[static_cast<std::size_t>(material)].albedo == glm::vec3(0.0F);
+        })) {
+      continue;
+    }
     const TriangleMesh& mesh = object.mesh;
     std::vector<std::uint32_t>& slot = slot_of_corner_[o];
     slot.resize(3 * mesh.triangles.size(), kNoSlot);

@@ -47,6 +47,7 @@ SpecularLayers trace_specular(const LitWorld& lit, const RayScene::View& without
                               const SampleStream& stream) {
   const World& world = lit.world;
   SpecularLayers layers;
+  if (!surface.specular()) return layers;
   layers.distant = lobe;
   const tracing::SpecularBounce bounce = tracing::specular_bounce(surface, stream, 0);
   if (bounce.weight == glm::vec3(0.0F)) return layers;
@@ -94,7 +95,7 @@ void check_reflector(const World& world, const Camera& camera, int reflector) {
                           "an object number below " + std::to_string(count));
   }
   const Object& object = world.scene.objects[static_cast<std::size_t>(reflector)];
-  if (!world.scene.materials[static_cast<std::size_t>(object.material)].specular) {
+  if (!is_specular(world.scene, object)) {
     throw InvalidArgument("reflector", "'" + object.name + "'", "an object with a specular material");
   }
   check_eye_outside(world, camera, reflector);

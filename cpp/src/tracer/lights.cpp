@@ -179,18 +179,35 @@ void Lights::add_sphere(std::size_t i) {
 
 void Lights::add_mesh(std::size_t i) {
   const Object& object = scene_->objects[i];
-  const Material& material = scene_->materials[static_cast<std::size_t>(object.material)];
-  glm::vec3 emission = material.emission;
-  if (luminance(emission) > 0.0F && material.emission_texture.texture >= 0) {
-    emission *= texture_mean(scene_->textures[static_cast<std::size_t>(material.emission_texture.texture)]);
+  // By material, in the order of materials_of().
+  const std::vector<int> materials = materials_of(object);
+  std::vector<glm::vec3> emissions;
+  for (const int index : materials) {
+    const Material& material = scene_->materials[static_cast<std::size_t>(index)];
+    glm::vec3& emission = emissions.emplace_back(material.emission);
+    if (luminance(emission) > 0.0F && material.emission_texture.texture >= 0) {
+      emission *= texture_mean(scene_->textures[static_cast<std::size_t>(material.emission_texture.texture)]);
+    }
   }
-  if (luminance(emission) <= 0.0F) return;
+  const auto emits = [](glm::vec3 emission) { return luminance(emission) > 0.0F; };
+  if (std::none_of(emissions.begin(), emissions.end(), emits)) return;
+  // Parts that do not emit have no area to choose a point from.
   std::vector<double> areas;
-  for (const glm::uvec3& t : object.mesh.triangles) {
+  glm::dvec3 flux(0.0);
+  double emitting = 0.0;
+  for (std::size_t k = 0; k < object.mesh.triangles.size(); ++k) {
+    const auto found = std::find(materials.begin(), materials.end(), material_of(object, k));
+    const glm::vec3 emission = emissions[static_cast<std::size_t>(found - materials.begin())];
+    const glm::uvec3& t = object.mesh.triangles[k];
     const glm::dvec3 a = object.mesh.positions[t.x];
-    areas.push_back(0.5 * glm::length(glm::cross(glm::dvec3(object.mesh.positions[t.y]) - a,
-                                                 glm::dvec3(object.mesh.positions[t.z]) - a)));
+    const double area = 0.5 * glm::length(glm::cross(glm::dvec3(object.mesh.positions[t.y]) - a,
+                                                     glm::dvec3(object.mesh.positions[t.z]) - a));
+    areas.push_back(emits(emission) ? area : 0.0);
+    flux += areas.back() * glm::dvec3(emission);
+    emitting += areas.back();
   }
+  if (!(emitting > 0.0)) return;
+  const glm::vec3 emission = materials.size() == 1 ? emissions.front() : glm::vec3(flux / emitting);
   Mesh& mesh = meshes_[i];
   mesh.area_cdf.resize(areas.size() + 1);
   mesh.area =
@@ -281,7 +298,8 @@ std::optional<LightSample> Lights::sample_mesh(int object, glm::vec3 position, g
   const glm::vec3 direction = to / distance;
   const float cosine = -glm::dot(direction, triangle_normal(p[corner.x], p[corner.y], p[corner.z]));
   if (!(cosine > 0.0F)) return std::nullopt;
-  const Material& material = scene_->materials[static_cast<std::size_t>(scene_->objects[index].material)];
+  const Material& material =
+      scene_->materials[static_cast<std::size_t>(material_of(scene_->objects[index], triangle))];
   glm::vec3 emission = material.emission;
   const glm::vec2 uv = uv_at(source, triangle, barycentric);
   if (material.emission_texture.texture >= 0) {

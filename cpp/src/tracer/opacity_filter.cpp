@@ -28,10 +28,11 @@ float chance(RTCRayN* rays, unsigned count, unsigned i, std::uint32_t object, st
 void filter(const RTCFilterFunctionNArguments* arguments) {
   const auto& lookup = *static_cast<const OpacityLookup*>(arguments->geometryUserPtr);
   const Object& object = lookup.scene->objects[lookup.object];
-  const Material& material = lookup.scene->materials[static_cast<std::size_t>(object.material)];
   for (unsigned i = 0; i < arguments->N; ++i) {
     if (arguments->valid[i] == 0) continue;
     const unsigned triangle = RTCHitN_primID(arguments->hit, arguments->N, i);
+    const Material& material =
+        lookup.scene->materials[static_cast<std::size_t>(material_of(object, triangle))];
     const glm::vec2 barycentric(RTCHitN_u(arguments->hit, arguments->N, i),
                                 RTCHitN_v(arguments->hit, arguments->N, i));
     const float opacity = opacity_at(*lookup.scene, material, uv_at(object.mesh, triangle, barycentric));

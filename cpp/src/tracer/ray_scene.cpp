@@ -21,7 +21,7 @@ std::vector<unsigned> assign_mask_bits(const Scene& scene) {
   std::vector<unsigned> bits(scene.objects.size(), kSharedBit);
   const auto rank = [&](const Object& object) {
     if (object.visibility != Visibility::all) return 0;
-    return scene.materials[static_cast<std::size_t>(object.material)].specular ? 1 : 2;
+    return is_specular(scene, object) ? 1 : 2;
   };
   int next = 0;
   for (int wanted = 0; wanted < 3; ++wanted) {
@@ -131,7 +131,7 @@ RayScene::RayScene(const Scene& scene)
   for (std::uint32_t i = 0; i < scene.objects.size(); ++i) opacity_lookups_.push_back({&scene, i});
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const TriangleMesh& mesh = scene.objects[i].mesh;
-    const bool gaps = has_gaps(scene.materials[static_cast<std::size_t>(scene.objects[i].material)]);
+    const bool gaps = has_gaps(scene, scene.objects[i]);
     geometries_.push_back(make_geometry(device_.get(), mesh.positions, mesh.triangles, origin_, mask_bits_[i],
                                         gaps ? &opacity_lookups_[i] : nullptr));
     const auto* buffer = static_cast<const glm::vec3*>(

@@ -24,7 +24,7 @@ void for_each_array(const Task& task) {
   };
   call(&S::pixel, &S::part, &S::triangle, &S::barycentric, &S::position, &S::normal, &S::reflection,
        &S::dposition_dx, &S::dposition_dy, &S::dreflection_dx, &S::dreflection_dy, &S::fresnel, &S::albedo,
-       &S::diffuse);
+       &S::emission, &S::diffuse);
 }
 
 /// Moves the rows' arrays one behind the other; `array` picks one out of a row's samples.
@@ -106,6 +106,7 @@ void record_surface(SurfaceSamples& out, const World& world, const Surface& s, f
   out.dreflection_dy.push_back(dy.reflection);
   out.fresnel.push_back(s.fresnel);
   out.albedo.push_back(s.albedo);
+  out.emission.push_back(s.emission);
 }
 
 std::vector<ShellLight> default_shells() { return {{"local", {}, {}}, {"distant", {}, {}}}; }

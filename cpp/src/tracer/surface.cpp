@@ -37,29 +37,45 @@ glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
 
 // The shading normal bent by a texture (glTF 2.0 §3.9.3). The tangents are those of the triangle's plane,
 // made upright to the normal that is interpolated over it.
-glm::vec3 mapped_normal(const Scene& scene, const Material& material, const TriangleMesh& mesh,
-                        const Surface& s, const std::array<glm::vec3, 3>& corners) {
-  if (mesh.uvs.empty()) return s.normal;
+glm::vec3 mapped_normal(const Scene& scene, const TriangleMesh& mesh, const Surface& s, glm::vec2 barycentric,
+                        const std::array<glm::vec3, 3>& corners, glm::vec3 normal) {
+  const Material& material = *s.material;
+  if (mesh.uvs.empty()) return normal;
   const glm::uvec3 t = mesh.triangles[s.triangle];
   const glm::vec2 du = mesh.uvs[t.y] - mesh.uvs[t.x];
   const glm::vec2 dv = mesh.uvs[t.z] - mesh.uvs[t.x];
   const float determinant = du.x * dv.y - du.y * dv.x;
-  if (determinant == 0.0F) return s.normal;
+  if (determinant == 0.0F) return normal;
   const glm::vec3 e1 = corners[1] - corners[0];
   const glm::vec3 e2 = corners[2] - corners[0];
   const glm::vec3 along_u = (dv.y * e1 - du.y * e2) * std::copysign(1.0F, determinant);
-  const glm::vec3 flat = along_u - glm::dot(along_u, s.normal) * s.normal;
+  const glm::vec3 flat = along_u - glm::dot(along_u, normal) * normal;
   const float length = glm::length(flat);
-  if (!(length > 0.0F)) return s.normal;
+  if (!(length > 0.0F)) return normal;
   const glm::vec3 tangent = flat / length;
-  const glm::vec3 bitangent = glm::cross(s.normal, tangent) * std::copysign(1.0F, determinant);
+  const glm::vec3 bitangent = glm::cross(normal, tangent) * std::copysign(1.0F, determinant);
   const glm::vec3 texel =
-      texture_lookup(scene, material.normal_texture, uv_at(mesh, s.triangle, s.barycentric)) * 2.0F - 1.0F;
-  const glm::vec3 bent =
-      material.normal_scale * (texel.x * tangent + texel.y * bitangent) + texel.z * s.normal;
+      texture_lookup(scene, material.normal_texture, uv_at(mesh, s.triangle, barycentric)) * 2.0F - 1.0F;
+  const glm::vec3 bent = material.normal_scale * (texel.x * tangent + texel.y * bitangent) + texel.z * normal;
   const float size = glm::length(bent);
   // One that leaves the triangle's front is a defect of the texture.
-  return size > 1e-6F && glm::dot(bent, s.geometric_normal) > 0.0F ? bent / size : s.normal;
+  const glm::vec3 front = triangle_normal(corners[0], corners[1], corners[2]);
+  return size > 1e-6F && glm::dot(bent, front) > 0.0F ? bent / size : normal;
+}
+
+// The unit shading normal on the triangle's front, of the surface's triangle at any place in its plane.
+glm::vec3 front_normal(const Scene& scene, const TriangleMesh& mesh, const Surface& s, glm::vec2 barycentric,
+                       const std::array<glm::vec3, 3>& corners) {
+  const glm::vec3 geometric = triangle_normal(corners[0], corners[1], corners[2]);
+  glm::vec3 normal = geometric;
+  if (!mesh.normals.empty()) {
+    const glm::vec3 n = interpolate(mesh.normals, mesh.triangles[s.triangle], barycentric);
+    const float length = glm::length(n);
+    // A normal on the wrong side of its triangle is a defect of the mesh.
+    if (length > 1e-6F && glm::dot(n, geometric) > 0.0F) normal = n / length;
+  }
+  if (s.material->normal_texture.texture < 0) return normal;
+  return mapped_normal(scene, mesh, s, barycentric, corners, normal);
 }
 
 }  // namespace
@@ -84,7 +100,7 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
   s.barycentric = {hit.u, hit.v};
   const Object& object = scene.objects[hit.geometry];
   const TriangleMesh& mesh = object.mesh;
-  s.material = &scene.materials[static_cast<std::size_t>(object.material)];
+  s.material = &scene.materials[static_cast<std::size_t>(material_of(object, hit.triangle))];
 
   const glm::uvec3 corner = mesh.triangles[hit.triangle];
   const std::span<const glm::vec3> positions = rays.positions(s.object);
@@ -100,16 +116,7 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
 
   s.geometric_normal = triangle_normal(a, b, c);
   s.front = glm::dot(s.geometric_normal, s.view) >= 0.0F;
-  s.normal = s.geometric_normal;
-  if (!mesh.normals.empty()) {
-    const glm::vec3 n = interpolate(mesh.normals, corner, s.barycentric);
-    const float length = glm::length(n);
-    // A normal on the wrong side of its triangle is a defect of the mesh.
-    if (length > 1e-6F && glm::dot(n, s.geometric_normal) > 0.0F) s.normal = n / length;
-  }
-  if (s.material->normal_texture.texture >= 0) {
-    s.normal = mapped_normal(scene, *s.material, mesh, s, {a, b, c});
-  }
+  s.normal = front_normal(scene, mesh, s, s.barycentric, {a, b, c});
   if (!s.front) {
     s.geometric_normal = -s.geometric_normal;
     s.normal = -s.normal;
@@ -146,6 +153,8 @@ Surface surface_at(const Scene& scene, const RayScene& rays, const Hit& hit, glm
       s.roughness = std::max(s.roughness, kSmoothest);
     }
     if (s.material->layers == LayerModel::coated) s.albedo *= 1.0F - s.fresnel;
+  } else {
+    s.reflection = reflect_about(s.view, s.normal);
   }
   return s;
 }
@@ -178,8 +187,9 @@ SurfaceDifferential surface_differential(const Scene& scene, const RayScene& ray
 
   // Reflection: r = d − 2 (d·n) n, with the normal's change from the change of the barycentric coordinates.
   const TriangleMesh& mesh = scene.objects[static_cast<std::size_t>(surface.object)].mesh;
+  const bool is_mapped = surface.material->normal_texture.texture >= 0;
   glm::vec3 dnormal(0.0F);
-  if (!mesh.normals.empty()) {
+  if (!mesh.normals.empty() || is_mapped) {
     const glm::uvec3 corner = mesh.triangles[surface.triangle];
     const std::span<const glm::vec3> positions = rays.positions(surface.object);
     const glm::dvec3 e1 = glm::dvec3(positions[corner.y]) - glm::dvec3(positions[corner.x]);
@@ -194,12 +204,19 @@ SurfaceDifferential surface_differential(const Scene& scene, const RayScene& ray
       const double p2 = glm::dot(dp, e2);
       const auto du = static_cast<float>((p1 * e22 - p2 * e12) / determinant);
       const auto dv = static_cast<float>((p2 * e11 - p1 * e12) / determinant);
-      const glm::vec3 n0 = mesh.normals[corner.x];
-      const glm::vec3 n1 = mesh.normals[corner.y];
-      const glm::vec3 n2 = mesh.normals[corner.z];
-      const glm::vec3 n = interpolate(mesh.normals, corner, surface.barycentric);
-      const float length = std::max(glm::length(n), 1e-6F);
-      const glm::vec3 change = ((n1 - n0) * du + (n2 - n0) * dv) / length;
+      glm::vec3 change;
+      if (is_mapped) {
+        // Texels have no derivative worth the name; the difference over the pixel is what a GPU takes.
+        const std::array<glm::vec3, 3> corners{positions[corner.x], positions[corner.y], positions[corner.z]};
+        change = front_normal(scene, mesh, surface, surface.barycentric + glm::vec2(du, dv), corners) -
+                 front_normal(scene, mesh, surface, surface.barycentric, corners);
+      } else {
+        const glm::vec3 n0 = mesh.normals[corner.x];
+        const glm::vec3 n1 = mesh.normals[corner.y];
+        const glm::vec3 n2 = mesh.normals[corner.z];
+        const glm::vec3 n = interpolate(mesh.normals, corner, surface.barycentric);
+        change = ((n1 - n0) * du + (n2 - n0) * dv) / std::max(glm::length(n), 1e-6F);
+      }
       dnormal = (surface.front ? 1.0F : -1.0F) * (change - glm::dot(change, surface.normal) * surface.normal);
     }
   }

@@ -20,14 +20,14 @@ struct Surface {
   const Material* material = nullptr;
   bool front = true;  ///< the ray hit the side from which the triangle is counter-clockwise
   glm::vec3 position{0.0F};
-  float position_error = 0.0F;       ///< bound of each coordinate's error
-  glm::vec3 geometric_normal{0.0F};  ///< unit
-  glm::vec3 normal{0.0F};            ///< unit shading normal
-  glm::vec3 view{0.0F};              ///< unit, towards where the ray came from
-  glm::vec3 albedo{0.0F};            ///< with texture; times (1 − F) under a coat
-  glm::vec3 fresnel{0.0F};           ///< at the cosine of normal and view; 0 unless specular
-  glm::vec3 reflection{0.0F};        ///< unit mirror direction, above the geometric surface; only if specular
-  glm::vec3 emission{0.0F};          ///< radiance emitted towards `view`
+  float position_error = 0.0F;        ///< bound of each coordinate's error
+  glm::vec3 geometric_normal{0.0F};   ///< unit
+  glm::vec3 normal{0.0F};             ///< unit shading normal
+  glm::vec3 view{0.0F};               ///< unit, towards where the ray came from
+  glm::vec3 albedo{0.0F};             ///< with texture; times (1 − F) under a coat
+  glm::vec3 fresnel{0.0F};            ///< at the cosine of normal and view; 0 unless specular
+  glm::vec3 reflection{0.0F};         ///< unit mirror direction; above the geometric surface if specular
+  glm::vec3 emission{0.0F};           ///< radiance emitted towards `view`
   glm::vec3 reflectance_scale{1.0F};  ///< of the Fresnel term's r0, by a texture
   float roughness = 0.0F;             ///< of the lobe `ggx`, with texture
 

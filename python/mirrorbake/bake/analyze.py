@@ -107,19 +107,21 @@ def _bounces(depth: int) -> str:
 
 
 def _samples(stage: Stage, depth: int) -> Decision:
-    config, material = stage.config, _material(stage)
+    config = stage.config
     if config.trace.samples is not None:
         return Decision("trace.samples", None, config.trace.samples, False, _SET, None)
-    if material.lobe == "mirror":
+    lobes = {material.lobe for material in _materials(stage) if material.specular}
+    if lobes <= {"mirror"}:
         reason = "a mirror needs one direction per sample, so that samples only smooth edges"
         return Decision("trace.samples", None, MIRROR_SAMPLES, True, reason, None)
     probe = Probe.of(stage, depth, LOBE_PROBE_SAMPLES)
     spread = relative_spread(probe.incident, probe.pixel)
     wanted = max((spread / config.auto.noise) ** 2, 1.0)
     samples = min(max(2 ** math.ceil(math.log2(wanted)), MIRROR_SAMPLES), MOST_SAMPLES)
+    names = " or ".join(sorted(lobes - {"mirror"}))
     reason = (
         f"samples of a pixel differ by {spread:.0%} since each takes one direction of the "
-        f"{material.lobe} lobe; {samples} leave a noise of {spread / math.sqrt(samples):.1%}"
+        f"{names} lobe; {samples} leave a noise of {spread / math.sqrt(samples):.1%}"
     )
     return Decision("trace.samples", None, samples, True, reason, spread)
 
@@ -128,8 +130,7 @@ def _diffuse(stage: Stage, probe: Probe) -> Decision:
     config = stage.config
     if config.layers.diffuse is not None:
         return Decision("layers.diffuse", None, config.layers.diffuse, False, _SET, None)
-    material = _material(stage)
-    if not any(material.albedo) and not any(material.emission):
+    if not any(any(material.albedo) or any(material.emission) for material in _materials(stage)):
         reason = "the material is black under its mirror"
         return Decision("layers.diffuse", None, False, True, reason, 0.0)
     change = relative_change(probe.beauty, probe.beauty - probe.diffuse, probe.pixel)
@@ -239,7 +240,9 @@ def _map_size(stage: Stage, proxy: _core.Proxy) -> Decision:
         return Decision("maps.size", None, SMALLEST_MAP, True, "no view sees the object", None)
     step = float(np.quantile(steps, share))
     reason = f"all but {share:.0%} of the pixels read places at least {math.degrees(step):.2g} degrees apart"
-    width = _lobe_width(_material(stage)) / TEXELS_PER_LOBE
+    width = (
+        min(_lobe_width(material) for material in _materials(stage) if material.specular) / TEXELS_PER_LOBE
+    )
     if width > step:
         step = width
         reason = (
@@ -299,6 +302,7 @@ def _lobe_width(material: _core.Material) -> float:
     return 0.0
 
 
-def _material(stage: Stage) -> _core.Material:
+def _materials(stage: Stage) -> list[_core.Material]:
+    """Of the reflector's parts."""
     scene = stage.built.scene
-    return scene.material(scene.object_material(stage.built.reflector))
+    return [scene.material(index) for index in scene.object_part_materials(stage.built.reflector)]

@@ -11,10 +11,13 @@ from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
 from mirrorbake.commands.options import (
     Assignments,
+    Draft,
     EmSize,
     Json,
+    ObjectFile,
     Seed,
     Size,
+    Sky,
     Spp,
     Threads,
     Views,
@@ -24,7 +27,12 @@ from mirrorbake.commands.options import (
 
 @reports_errors
 def analyze_command(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)],
+    scene: Annotated[
+        Path | None, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)
+    ] = None,
+    object_file: ObjectFile = None,
+    sky: Sky = None,
+    draft: Draft = None,
     views: Views = None,
     size: Size = None,
     spp: Spp = None,
@@ -40,7 +48,7 @@ def analyze_command(
     from mirrorbake.bake.analyze import analyze
     from mirrorbake.scene.stage import prepare_stage
 
-    config = scene_config(scene, assignments, views, size, spp, em_size, seed)
+    config = scene_config(scene, assignments, views, size, spp, em_size, seed, object_file, sky, draft=draft)
     with _core.ThreadLimit(threads):
         plan = analyze(prepare_stage(config))
     if json:

@@ -11,9 +11,12 @@ from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
 from mirrorbake.commands.options import (
     Assignments,
+    Draft,
     EmSize,
+    ObjectFile,
     Seed,
     Size,
+    Sky,
     Spp,
     Threads,
     Views,
@@ -38,7 +41,6 @@ def _parse_samples(text: str, count: int) -> range:
 
 @reports_errors
 def bake_command(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)],
     out: Annotated[
         str,
         typer.Option(
@@ -48,6 +50,12 @@ def bake_command(
             show_default=False,
         ),
     ],
+    scene: Annotated[
+        Path | None, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)
+    ] = None,
+    object_file: ObjectFile = None,
+    sky: Sky = None,
+    draft: Draft = None,
     views: Views = None,
     size: Size = None,
     spp: Spp = None,
@@ -78,14 +86,14 @@ def bake_command(
     """Bake a scene's reflections into one set of environment maps per sample of its parameter space.
 
     What the scene leaves to be decided ("auto") is decided first and printed, as `analyze` does, with the
-    time and the disk space that the bake will take.
+    time and the disk space that the bake will take. Instead of a scene file, --object and --sky are enough.
     """
     from mirrorbake.bake.bake import bake
     from mirrorbake.scene.parameters import space_of
 
     if quality is not None:
         assignments = [*(assignments or []), f"auto.quality={quality}"]
-    config = scene_config(scene, assignments, views, size, spp, em_size, seed)
+    config = scene_config(scene, assignments, views, size, spp, em_size, seed, object_file, sky, draft=draft)
     chosen = None if samples is None else _parse_samples(samples, len(space_of(config)))
 
     def announce(found: Estimate) -> bool:

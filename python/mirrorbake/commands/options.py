@@ -76,19 +76,48 @@ Assignments = Annotated[
 ]
 
 
+ObjectFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--object", metavar="FILE", help="The reflector: an .obj, .gltf or .glb file. [default: reflector]"
+    ),
+]
+Sky = Annotated[
+    Path | None,
+    typer.Option("--sky", metavar="FILE", help="A panorama around it. [default: surroundings]"),
+]
+Draft = Annotated[
+    bool | None,
+    typer.Option(
+        "--draft/--full",
+        help="A first look in a minute or two: 9 views on 16 degrees, 256 x 256 pixels, maps of 128, "
+        "32 samples, where the scene says nothing else. [default: draft without a SCENE.toml, else full]",
+        show_default=False,
+    ),
+]
+
+
 def scene_config(
-    scene: Path,
+    scene: Path | None,
     assignments: list[str] | None,
     views: int | None,
     size: str | None,
     spp: int | None,
     em_size: int | None,
     seed: int | None,
+    object_file: Path | None = None,
+    sky: Path | None = None,
+    *,
+    draft: bool | None = None,
 ) -> SceneConfig:
     """Load a scene file, with --set and the options that have names of their own instead of its values."""
     from mirrorbake.scene.load import load_config
 
+    if scene is None and object_file is None:
+        raise typer.BadParameter("expected a SCENE.toml, or --object FILE")
     named = {
+        ("reflector", "mesh"): None if object_file is None else str(object_file),
+        ("surroundings", "panorama"): None if sky is None else str(sky),
         ("views", "count"): views,
         ("views", "size"): None if size is None else _parse_size(size),
         ("trace", "samples"): spp,
@@ -97,7 +126,7 @@ def scene_config(
     }
     overrides: list[tuple[tuple[str, ...], Any]] = [_parse_set(text) for text in assignments or []]
     overrides += [(key, value) for key, value in named.items() if value is not None]
-    return load_config(scene, overrides)
+    return load_config(scene, overrides, draft=scene is None if draft is None else draft)
 
 
 def print_plan(plan: Plan) -> None:

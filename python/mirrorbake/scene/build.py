@@ -11,22 +11,16 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.errors import InputError
 from mirrorbake.scene.cameras import Cameras, resolve_cameras
-from mirrorbake.scene.config import (
-    ILLUMINANT,
-    MaterialConfig,
-    Reflector,
-    SceneConfig,
-    Surroundings,
-)
 from mirrorbake.scene.parameters import ParameterSpace, Point, format_point, space_of
-from mirrorbake.scene.pose import Pose, rotation_matrix
+from mirrorbake.scene.pose import Pose
+from mirrorbake.scene.reflector import add_reflector
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.scene.config import SceneConfig, Surroundings
 
-REFLECTOR_NAME = "reflector"
 GROUND_THICKNESS = 0.02
 
 
@@ -77,14 +71,9 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
         surroundings = surroundings.model_copy(update={"rotation": turned})
     scene, notes = _surroundings(surroundings)
     pose = Pose.of(config, place.get("motion", 0.0))
-    if config.reflector.scene_object is None:
-        mesh, part_names = _load_reflector(config.reflector, pose)
-        assert config.material is not None
-        material = _material(config.material, scene)
-        reflector = scene.add_object(REFLECTOR_NAME, mesh, material, part_names)
-    else:
-        reflector = _scene_reflector(config, scene)
-        mesh, part_names = scene.object_mesh(reflector), scene.object_part_names(reflector)
+    reflector, more_notes = add_reflector(config, scene, pose)
+    notes += more_notes
+    mesh, part_names = scene.object_mesh(reflector), scene.object_part_names(reflector)
     positions = np.asarray(mesh.positions)
     triangles = np.asarray(mesh.triangles)
     parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
@@ -144,92 +133,6 @@ def winding_number(positions: FloatArray, triangles: NDArray[np.uint32], point: 
 
 def _vector(v: tuple[float, float, float]) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in v) + ")"
-
-
-def _load_reflector(reflector: Reflector, pose: Pose) -> tuple[_core.TriangleMesh, list[str]]:
-    if reflector.mesh is None:
-        mesh = _core.make_teapot(reflector.subdivisions, reflector.height)
-    else:
-        mesh = _core.load_mesh(reflector.mesh)
-    rotation = rotation_matrix(reflector.rotation)
-    positions = np.asarray(mesh.positions).astype(np.float64) @ rotation.T
-    if reflector.mesh is not None:
-        positions = _stand_on_ground(positions, reflector)
-    split = reflector.object is not None and reflector.parts == "split"
-    names = _core.teapot_part_names() if split else [reflector.object or "object"]
-    # Rotation and uniform scale leave normals unit vectors.
-    normals = np.asarray(mesh.normals).astype(np.float64) @ (pose.rotation @ rotation).T
-    placed = _core.TriangleMesh(
-        pose.moved(positions + np.array(reflector.position)).astype(np.float32),
-        mesh.triangles,
-        normals.astype(np.float32) if len(normals) else None,
-        mesh.uvs if len(mesh.uvs) else None,
-        mesh.parts if split else None,
-    )
-    return placed, list(names)
-
-
-def _stand_on_ground(positions: NDArray[np.float64], reflector: Reflector) -> NDArray[np.float64]:
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    if reflector.scale is not None:
-        scale = reflector.scale
-    elif high[1] - low[1] > 1e-6 * np.max(high - low):
-        scale = reflector.height / (high[1] - low[1])
-    else:
-        raise InputError(
-            f"{reflector.mesh}: the mesh is flat, so it cannot be scaled to reflector.height; "
-            "turn it with reflector.rotation or give reflector.scale"
-        )
-    base = np.array([0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])])
-    placed: NDArray[np.float64] = (positions - base) * scale
-    return placed
-
-
-def _material(config: MaterialConfig, scene: _core.Scene) -> int:
-    eta, k = config.eta or config.ior or (1.5, 1.5, 1.5), config.k or (0.0, 0.0, 0.0)
-    if config.metal is not None:
-        fit = _core.fit_metal(config.metal, ILLUMINANT)
-        eta, k = fit.eta, fit.k
-    model = config.fresnel
-    fresnel = _core.Fresnel(model=model, r0=config.r0 or (0.9, 0.9, 0.9), eta=eta, k=k)
-    texture = _core.TextureReference()
-    if config.texture is not None:
-        texture.texture = scene.add_texture(_load_rgb(config.texture))
-    material = _core.Material(
-        name=REFLECTOR_NAME,
-        specular=True,
-        fresnel=fresnel,
-        albedo=config.albedo,
-        albedo_texture=texture,
-        layers=config.layers,
-    )
-    return scene.add_material(material)
-
-
-def _scene_reflector(config: SceneConfig, scene: _core.Scene) -> int:
-    name, names = config.reflector.scene_object, scene.object_names
-    if name not in names:
-        known = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
-        raise InputError(f"{config.surroundings.scene}: has no object {name!r}; its objects: {known}")
-    reflector = names.index(name)
-    if config.material is not None:
-        # Other objects may share the file's material.
-        scene.set_object_material(reflector, _material(config.material, scene))
-    elif not scene.material(scene.object_material(reflector)).specular:
-        raise InputError(
-            f"{config.surroundings.scene}: the material of {name!r} is matte; "
-            "a section [material] makes it shine"
-        )
-    return reflector
-
-
-def _load_rgb(path: str) -> FloatArray:
-    pixels, channels = _core.load_image(path)
-    if pixels.shape[2] == 1:
-        return np.repeat(pixels, 3, axis=2)
-    if pixels.shape[2] == 2 or list(channels[:3]) not in (["R", "G", "B"], ["r", "g", "b"]):
-        raise InputError(f"{path}: channels {', '.join(channels)}; expected R, G, B")
-    return np.ascontiguousarray(pixels[..., :3])
 
 
 def _surroundings(surroundings: Surroundings) -> tuple[_core.Scene, list[str]]:

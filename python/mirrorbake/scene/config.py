@@ -35,7 +35,8 @@ class Reflector(Section):
     object: Literal["teapot"] | None = None
     """A built-in object; or give `mesh` or `scene_object`."""
     mesh: str | None = None
-    """An .obj, .gltf or .glb file; or give `object` or `scene_object`."""
+    """An .obj, .gltf or .glb file, with its materials unless there is a section [material]; or give `object`
+    or `scene_object`."""
     scene_object: str | None = None
     """Name of an object of `surroundings.scene`, which stays where it is; its material is the file's, unless
     there is a section [material]."""
@@ -51,7 +52,7 @@ class Reflector(Section):
     subdivisions: Annotated[int, Field(ge=1, le=128)] = 25
     """The teapot's tessellation: every patch becomes subdivisions² · 2 triangles."""
     parts: Literal["split", "joined"] = "split"
-    """Whether each part (the teapot's lid and body) gets maps of its own."""
+    """Whether each part (the teapot's lid and body, the objects of a file) gets maps of its own."""
 
     @model_validator(mode="before")
     @classmethod
@@ -300,7 +301,7 @@ class SceneConfig(Section):
 
     reflector: Reflector = Reflector(object="teapot")
     material: MaterialConfig | None = None
-    """None: the material that a `scene_object` has in its file."""
+    """None: the materials that a `mesh` or a `scene_object` has in its file."""
     surroundings: Surroundings = Surroundings(room="furnished")
     views: Views = Views()
     motion: Motion | None = None
@@ -316,11 +317,13 @@ class SceneConfig(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _other_reflectors_have_a_material(cls, data: Any) -> Any:
+    def _built_in_objects_have_a_material(cls, data: Any) -> Any:
         if not isinstance(data, Mapping) or data.get("material") is not None:
             return data
         reflector = data.get("reflector")
-        if isinstance(reflector, Mapping) and reflector.get("scene_object") is not None:
+        if isinstance(reflector, Mapping) and any(
+            reflector.get(key) is not None for key in ("scene_object", "mesh")
+        ):
             return data
         return {**data, "material": {}}
 

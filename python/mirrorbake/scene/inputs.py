@@ -43,8 +43,11 @@ def hash_inputs(config: SceneConfig) -> Inputs:
         name = f"{section}.{key}"
         inputs[name] = {"path": path, "sha256": sha256_of(Path(path))}
         if name in _CONTENT:
+            # A mesh that is of the file's own materials refers to their images, too.
+            whole = name == "reflector.mesh" and config.material is None
+            content = "scene" if whole else _CONTENT[name]
             folder = Path(path).resolve().parent
-            files = [Path(file) for file in _core.referenced_files(path, _CONTENT[name])]
+            files = [Path(file) for file in _core.referenced_files(path, content)]
             inputs[name]["files"] = {
                 file.relative_to(folder).as_posix(): sha256_of(file) for file in sorted(files)
             }

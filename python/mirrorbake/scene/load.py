@@ -113,15 +113,28 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {failure}") from None
 
 
+DRAFT: Mapping[str, Mapping[str, Any]] = {
+    "views": {"count": 9, "degrees": 16.0, "size": [256, 256]},
+    "maps": {"size": 128},
+    "trace": {"samples": 32},
+}
+"""Values for a first bake of a minute or two."""
+
+
 def load_config(
-    path: str | PathLike[str], overrides: Sequence[tuple[tuple[str, ...], Any]] = ()
+    path: str | PathLike[str] | None,
+    overrides: Sequence[tuple[tuple[str, ...], Any]] = (),
+    *,
+    draft: bool = False,
 ) -> SceneConfig:
     """Read and validate a scene file.
 
     Parameters
     ----------
     path
-        The TOML file. Relative paths in it are resolved against its folder.
+        The TOML file. Relative paths in it are resolved against its folder. None: an empty one.
+    draft
+        Whether keys that are not given have the values of `DRAFT`, for a first look.
     overrides
         Key paths with values that replace the file's, as of `parse_override`; relative paths in them are
         resolved against the current folder. An override of `reflector.mesh` drops `reflector.object`, and so
@@ -133,8 +146,12 @@ def load_config(
         The file is missing or not TOML, or a key is wrong. It is an OptionError if the key, or one that it
         does not go with, is an override.
     """
-    data = _read_toml(Path(path))
-    _resolve_paths(data, Path(path).resolve().parent)
+    data: dict[str, Any] = {}
+    if path is not None:
+        data = _read_toml(Path(path))
+        _resolve_paths(data, Path(path).resolve().parent)
+    if draft:
+        _add_draft(data)
     replacements: dict[str, Any] = {}
     for keys, value in overrides:
         _insert(replacements, keys, value)
@@ -147,6 +164,18 @@ def load_config(
         if any(_concerns(errors[0], keys) for keys, _ in overrides):
             raise OptionError(_describe_all(errors)) from None
         raise InputError(f"{path}: {_describe_all(errors)}") from None
+
+
+def _add_draft(data: dict[str, Any]) -> None:
+    for section, values in DRAFT.items():
+        given = data.setdefault(section, {})
+        if not isinstance(given, dict):
+            continue
+        # A dome's and a single camera's counts and degrees mean other things than an arc's.
+        is_arc = given.get("kind", "arc") == "arc"
+        for key, value in values.items():
+            if is_arc or key == "size":
+                given.setdefault(key, value)
 
 
 def _concerns(error: ErrorDetails, keys: tuple[str, ...]) -> bool:

@@ -118,7 +118,18 @@ struct Object {
   int material = 0;                     ///< index into Scene::materials
   std::vector<std::string> part_names;  ///< e.g. {"body", "lid"}; empty: one part, named as the object
   Visibility visibility = Visibility::all;
+  /// One per part, indices into Scene::materials; empty: all parts are of `material`.
+  std::vector<int> part_materials = {};
 };
+
+/// Index of the material of an object's triangle.
+inline int material_of(const Object& object, std::size_t triangle) {
+  if (object.part_materials.empty()) return object.material;
+  return object.part_materials[object.mesh.parts.empty() ? 0 : object.mesh.parts[triangle]];
+}
+
+/// Indices of the materials of an object's parts, each once, in order.
+std::vector<int> materials_of(const Object& object);
 
 /// A one-sided rectangle `corner + a·edge_u + b·edge_v`, a and b in [0,1], that emits along edge_u × edge_v.
 /// It is visible to rays. Meshes emit too: by their material's emission.
@@ -186,6 +197,18 @@ glm::vec3 texture_lookup(const Scene& scene, const TextureReference& reference, 
 
 /// Whether rays pass through some of the surface.
 bool has_gaps(const Material& material);
+
+/// One object of all the objects of a scene, in their order: a part each, named as the object, or, if there
+/// are more than `most_parts`, a part for each material, named as that. What only some of the meshes have is
+/// completed: flat normals, coordinates (0, 0), white. Throws InvalidArgument if the scene has no objects.
+Object join_objects(const Scene& scene, const std::string& name, std::size_t most_parts);
+
+/// Adds copies of another scene's textures and materials; returns the index of the first material.
+int add_materials(Scene& scene, const Scene& from);
+
+/// Whether any part of an object has a specular lobe, or gaps.
+bool is_specular(const Scene& scene, const Object& object);
+bool has_gaps(const Scene& scene, const Object& object);
 
 /// The part of a surface that is there for a mesh's coordinates `uv`, v up: 0 or 1 if the material has a
 /// cutoff.

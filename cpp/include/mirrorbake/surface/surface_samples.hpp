@@ -49,8 +49,9 @@ struct SurfaceSamples {
   std::vector<glm::vec3> dposition_dx, dposition_dy;
   std::vector<glm::vec3> dreflection_dx, dreflection_dy;
 
-  std::vector<glm::vec3> fresnel;  ///< F of the first bounce, per channel
-  std::vector<glm::vec3> albedo;   ///< diffuse albedo with texture, times (1 − F) under a coat
+  std::vector<glm::vec3> fresnel;   ///< F of the first bounce, per channel
+  std::vector<glm::vec3> albedo;    ///< diffuse albedo with texture, times (1 − F) under a coat
+  std::vector<glm::vec3> emission;  ///< radiance of the surface's own; empty: none
 
   // The light that was traced; empty when only visibility was asked for.
   std::vector<glm::vec3> diffuse;  ///< D: radiance that the body reflects and emits, one entry per sample

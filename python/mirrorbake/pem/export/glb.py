@@ -71,6 +71,8 @@ def export_glb(
     described, notes = gltf_material(material)
     exported = export_materials(built.scene, [built.scene.object_material(built.reflector)])
     notes += exported.notes
+    if len(set(built.scene.object_part_materials(built.reflector))) > 1:
+        notes.append(f"the materials of all parts but the first are left out: all are of {material.name}")
     described.setdefault("extensions", {})
     add_textures(described, exported.materials[0], exported.textures, file, TEXTURE_SIZE)
     code = _code_for(sets())

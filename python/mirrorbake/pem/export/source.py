@@ -88,7 +88,9 @@ def export_source(pem: OpenedPem) -> ExportSource:
         for part in header.parts
     )
     mesh = built.scene.object_mesh(built.reflector)
-    materials = export_materials(built.scene, [built.scene.object_material(built.reflector)])
+    of_part = built.scene.object_part_materials(built.reflector)
+    numbers = sorted(set(of_part))
+    materials = export_materials(built.scene, numbers)
     local = store.read_local_triangles()
     whole = np.ones(len(built.triangles), np.bool_) if local is None else local != 0
 
@@ -117,7 +119,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
             whole_stack=whole,
             uvs=np.asarray(mesh.uvs),
             colors=np.asarray(mesh.colors),
-            materials=np.zeros(len(built.triangles), np.uint16),
+            materials=np.array([numbers.index(number) for number in of_part], np.uint16)[built.parts],
             irradiance=first,
         ),
         materials=materials,

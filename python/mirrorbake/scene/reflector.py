@@ -1,0 +1,192 @@
+"""The reflector of a scene file: a built-in object, a mesh from its own file, or an object of the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mirrorbake import _core
+from mirrorbake.errors import InputError
+from mirrorbake.scene.config import ILLUMINANT, MaterialConfig, Reflector, SceneConfig
+from mirrorbake.scene.pose import Pose, rotation_matrix
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from mirrorbake.arrays import FloatArray
+
+REFLECTOR_NAME = "reflector"
+MOST_PARTS = 8
+"""A file with more objects is split into parts by its materials: every part has maps of its own."""
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What there is of a reflector before it stands in the scene."""
+
+    mesh: _core.TriangleMesh
+    part_names: list[str]
+    part_materials: list[int]
+    """Indices into the scene's materials; empty: the scene file's."""
+    notes: list[str]
+
+
+def add_reflector(config: SceneConfig, scene: _core.Scene, pose: Pose) -> tuple[int, list[str]]:
+    """Put the reflector of a scene file into a scene.
+
+    Parameters
+    ----------
+    config
+        The scene file.
+    scene
+        Its surroundings.
+    pose
+        Where the object has moved to.
+
+    Returns
+    -------
+    tuple
+        Number of the object, and what the user should know of its file.
+
+    Raises
+    ------
+    InputError
+        The scene has no such object, or a matte one, or the mesh is flat and has no scale.
+    mirrorbake.FileError
+        The mesh, or an image of it, is missing or corrupt.
+    """
+    reflector = config.reflector
+    if reflector.scene_object is not None:
+        return _scene_reflector(config, scene), []
+    source = _source(config, scene)
+    mesh = _placed(source.mesh, reflector, pose)
+    materials = source.part_materials
+    if materials:
+        number = scene.add_object(
+            REFLECTOR_NAME, mesh, materials[0], source.part_names, part_materials=materials
+        )
+    else:
+        material = _material(config.material or MaterialConfig(), scene)
+        number = scene.add_object(REFLECTOR_NAME, mesh, material, source.part_names)
+    return number, source.notes
+
+
+def _source(config: SceneConfig, scene: _core.Scene) -> _Source:
+    reflector = config.reflector
+    if reflector.mesh is None:
+        mesh = _core.make_teapot(reflector.subdivisions, reflector.height)
+        if reflector.parts == "split":
+            return _Source(mesh, list(_core.teapot_part_names()), [], [])
+        return _Source(_without_parts(mesh), [reflector.object or "object"], [], [])
+    if config.material is not None:
+        return _Source(_core.load_mesh(reflector.mesh), ["object"], [], [])
+    loaded = _core.load_scene(reflector.mesh)
+    notes = [f"{reflector.mesh}: {w.message} ({w.count} times)" for w in loaded.warnings]
+    mesh, names, materials = loaded.scene.join_objects(MOST_PARTS)
+    if not any(loaded.scene.material(index).specular for index in materials):
+        notes.append(
+            f"{reflector.mesh}: no material of it shines, so it is a mirror; [material] says of what"
+        )
+        materials = []
+    if reflector.parts == "joined":
+        if len(set(materials)) > 1:
+            raise InputError(
+                f"{reflector.mesh}: its objects are of {len(set(materials))} materials, which "
+                "reflector.parts = 'joined' cannot keep apart; expected 'split', or a section [material]"
+            )
+        mesh, names, materials = _without_parts(mesh), ["object"], materials[:1]
+    first = scene.add_materials(loaded.scene) if materials else 0
+    return _Source(mesh, names, [first + index for index in materials], notes)
+
+
+def _without_parts(mesh: _core.TriangleMesh) -> _core.TriangleMesh:
+    return _core.TriangleMesh(
+        mesh.positions,
+        mesh.triangles,
+        mesh.normals if len(mesh.normals) else None,
+        mesh.uvs if len(mesh.uvs) else None,
+        None,
+        mesh.colors if len(mesh.colors) else None,
+    )
+
+
+def _placed(mesh: _core.TriangleMesh, reflector: Reflector, pose: Pose) -> _core.TriangleMesh:
+    rotation = rotation_matrix(reflector.rotation)
+    positions = np.asarray(mesh.positions).astype(np.float64) @ rotation.T
+    if reflector.mesh is not None:
+        positions = _stand_on_ground(positions, reflector)
+    # Rotation and uniform scale leave normals unit vectors.
+    normals = np.asarray(mesh.normals).astype(np.float64) @ (pose.rotation @ rotation).T
+    return _core.TriangleMesh(
+        pose.moved(positions + np.array(reflector.position)).astype(np.float32),
+        mesh.triangles,
+        normals.astype(np.float32) if len(normals) else None,
+        mesh.uvs if len(mesh.uvs) else None,
+        mesh.parts if len(mesh.parts) else None,
+        mesh.colors if len(mesh.colors) else None,
+    )
+
+
+def _stand_on_ground(positions: NDArray[np.float64], reflector: Reflector) -> NDArray[np.float64]:
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    if reflector.scale is not None:
+        scale = reflector.scale
+    elif high[1] - low[1] > 1e-6 * np.max(high - low):
+        scale = reflector.height / (high[1] - low[1])
+    else:
+        raise InputError(
+            f"{reflector.mesh}: the mesh is flat, so it cannot be scaled to reflector.height; "
+            "turn it with reflector.rotation or give reflector.scale"
+        )
+    base = np.array([0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])])
+    placed: NDArray[np.float64] = (positions - base) * scale
+    return placed
+
+
+def _material(config: MaterialConfig, scene: _core.Scene) -> int:
+    eta, k = config.eta or config.ior or (1.5, 1.5, 1.5), config.k or (0.0, 0.0, 0.0)
+    if config.metal is not None:
+        fit = _core.fit_metal(config.metal, ILLUMINANT)
+        eta, k = fit.eta, fit.k
+    model = config.fresnel
+    fresnel = _core.Fresnel(model=model, r0=config.r0 or (0.9, 0.9, 0.9), eta=eta, k=k)
+    texture = _core.TextureReference()
+    if config.texture is not None:
+        texture.texture = scene.add_texture(_load_rgb(config.texture))
+    material = _core.Material(
+        name=REFLECTOR_NAME,
+        specular=True,
+        fresnel=fresnel,
+        albedo=config.albedo,
+        albedo_texture=texture,
+        layers=config.layers,
+    )
+    return scene.add_material(material)
+
+
+def _scene_reflector(config: SceneConfig, scene: _core.Scene) -> int:
+    name, names = config.reflector.scene_object, scene.object_names
+    if name not in names:
+        known = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
+        raise InputError(f"{config.surroundings.scene}: has no object {name!r}; its objects: {known}")
+    reflector = names.index(name)
+    if config.material is not None:
+        # Other objects may share the file's material.
+        scene.set_object_material(reflector, _material(config.material, scene))
+    elif not any(scene.material(index).specular for index in scene.object_part_materials(reflector)):
+        raise InputError(
+            f"{config.surroundings.scene}: the material of {name!r} is matte; "
+            "a section [material] makes it shine"
+        )
+    return reflector
+
+
+def _load_rgb(path: str) -> FloatArray:
+    pixels, channels = _core.load_image(path)
+    if pixels.shape[2] == 1:
+        return np.repeat(pixels, 3, axis=2)
+    if pixels.shape[2] == 2 or list(channels[:3]) not in (["R", "G", "B"], ["r", "g", "b"]):
+        raise InputError(f"{path}: channels {', '.join(channels)}; expected R, G, B")
+    return np.ascontiguousarray(pixels[..., :3])

@@ -29,8 +29,6 @@ __all__ = [
     "FresnelTable",
     "MetalColour",
     "Schlick",
-    "combine_coated",
-    "combine_layers",
     "conductor",
     "dielectric",
     "dielectric_transmittance",
@@ -306,19 +304,3 @@ def metal_colour(metal: str, illuminant: Illuminant = "D65") -> MetalColour:
     return MetalColour(
         metal, illuminant, source, (red, green, blue), fit.r0, fit.r0_error, fit.eta, fit.k, fit.index_error
     )
-
-
-def combine_layers(f: ArrayLike, mirror: ArrayLike, diffuse: ArrayLike) -> Array:
-    """``F L_m + L_d``: mirror radiance over an independent diffuse layer ([PEM] section 3)."""
-    result: Array = np.asarray(f) * np.asarray(mirror) + np.asarray(diffuse)
-    return result
-
-
-def combine_coated(f: ArrayLike, mirror: ArrayLike, base: ArrayLike) -> Array:
-    """``F L_m + (1 - F) L_d``: a diffuse base under a smooth coat ([EMT] section 3.1.1).
-
-    With a prefiltered Phong map as ``mirror`` and an irradiance map as ``base`` it is [AEM] eq. 8.
-    """
-    f = np.asarray(f)
-    result: Array = f * np.asarray(mirror) + (1 - f) * np.asarray(base)
-    return result

@@ -314,10 +314,12 @@ def test_the_demonstration_is_the_teapot_at_one_degree() -> None:
     assert config.views.degrees / (config.views.count - 1) == 1.0
 
 
-def test_a_sample_has_the_same_bits_baked_alone_or_in_any_order_with_any_threads(tmp_path: Path) -> None:
-    config = parse_config(
-        {**SMALL, "maps": {"size": 16}, "views": {"count": 3, "degrees": 20.0, "size": [40, 30]}}, "order"
-    )
+@pytest.mark.parametrize("fit", ["layers", "display"])
+def test_a_sample_has_the_same_bits_baked_alone_or_in_any_order_with_any_threads(
+    tmp_path: Path, fit: str
+) -> None:
+    views = {"count": 3, "degrees": 20.0, "size": [40, 30]}
+    config = parse_config({**SMALL, "maps": {"size": 16}, "views": views, "infer": {"fit": fit}}, "order")
 
     def maps(name: str, orders: list[list[int]], threads: int) -> list[bytes]:
         with _core.ThreadLimit(threads):

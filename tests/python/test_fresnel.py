@@ -211,11 +211,5 @@ def test_metal_colour_is_the_integral_of_its_spectrum() -> None:
     assert [548.6, 0.43, 2.455] in constants.tolist()
 
 
-def test_a_coat_shares_energy_with_its_base() -> None:
-    f = fresnel.dielectric(np.linspace(0, 1, 9), 1.5)
-    np.testing.assert_allclose(fresnel.combine_coated(f, 1.0, 1.0), 1.0)
-    np.testing.assert_allclose(fresnel.combine_layers(f, 2.0, 0.25), 2 * f + 0.25)
-
-
 def test_an_instruction_set_is_in_use() -> None:
     assert _core.active_isa() in {"baseline", "sse42", "avx2", "avx512"}

@@ -115,5 +115,6 @@ class EnvmapCommand {
 };
 
 std::unique_ptr<EnvmapCommand> add_prefilter(CLI::App& app);
+std::unique_ptr<EnvmapCommand> add_preview(CLI::App& app);
 
 }  // namespace mirrorbake::tool

@@ -345,6 +345,7 @@ int run(int argc, char** argv) {
   first.add_details(*compare_command, "both maps");
 
   const std::unique_ptr<EnvmapCommand> prefilter_command = add_prefilter(app);
+  const std::unique_ptr<EnvmapCommand> preview_command = add_preview(app);
 
   try {
     app.parse(argc, argv);
@@ -361,6 +362,7 @@ int run(int argc, char** argv) {
   if (*sample_command)
     print_samples(sample_input.load(), directions, parse_sample_filter(sample_filter), footprint, json);
   if (prefilter_command->wanted()) prefilter_command->run(json);
+  if (preview_command->wanted()) preview_command->run(json);
   if (*compare_command) {
     second.projection = first.projection;
     second.layout = first.layout;

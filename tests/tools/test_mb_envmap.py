@@ -12,6 +12,7 @@ import pytest
 
 from mirrorbake.envmap import EnvMap
 from mirrorbake.projection import texel_directions
+from mirrorbake.tone import displayed
 from programs import find_program, needs_program, run_program
 
 pytestmark = needs_program("mb-envmap")
@@ -326,6 +327,18 @@ def test_rotate_keeps_projection_and_size_and_a_turn_back_restores(tmp_path: Pat
     mb_envmap("rotate", there, "--turn", -50, *axis, "--exposure", -1, "-o", back)
     # Texels are 0.1 rad wide; two interpolations move the light by less than a third of that.
     np.testing.assert_allclose(EnvMap.load(back).values, (2 + d).ravel(), atol=0.03)
+
+
+def test_preview_is_tone_mapped_as_everywhere(tmp_path: Path) -> None:
+    values = np.random.default_rng(3).random((16, 32, 3), np.float32) ** 4 * 20
+    EnvMap.from_array(values, "latlong").save(tmp_path / "in.exr", format="float32")
+    arguments = ("preview", tmp_path / "in.exr", "--size", 16, "--exposure", -1)
+    for tone in ("neutral", "none"):
+        mb_envmap(*arguments, "--tone", tone, "-o", tmp_path / "out.png")
+        expected = np.clip(displayed(values, -1.0, tone), 0, 1)
+        # Steps of 1/255 in sRGB are at most 0.009 of linear light.
+        shown = EnvMap.load(tmp_path / "out.png").level()
+        np.testing.assert_allclose(shown, expected, atol=0.006)
 
 
 def test_mips_go_through_dds(tmp_path: Path) -> None:

@@ -1,3 +1,4 @@
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -5,6 +6,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <memory>
@@ -184,6 +186,25 @@ void bind_shapes(nb::module_& m) {
       "missing, corrupt, empty or refers to files outside its directory.");
 }
 
+void bind_winding(nb::module_& m) {
+  m.def(
+      "winding_number",
+      [](const TriangleMesh& mesh, std::array<double, 3> point) {
+        return winding_number(mesh, {point[0], point[1], point[2]});
+      },
+      nb::arg("mesh"), nb::arg("point"),
+      "How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van "
+      "Oosterom\n"
+      "and Strackee 1983). Exactly 0 outside of the bounding box.");
+  m.def(
+      "encloses",
+      [](const TriangleMesh& mesh, std::array<double, 3> point) {
+        return encloses(mesh, {point[0], point[1], point[2]});
+      },
+      nb::arg("mesh"), nb::arg("point"),
+      "Whether a point, such as an eye, lies inside of a body: whether it winds about it more than half.");
+}
+
 void bind_visibility(nb::module_& m) {
   nb::enum_<Visibility>(m, "Visibility", nb::is_flag(), "A set of the kinds of rays that see an object.")
       .value("none", Visibility::none)
@@ -215,24 +236,28 @@ void bind_loaded_scene(nb::module_& m) {
       "load_scene",
       [](const PathText& path, int max_texture_side, std::uint64_t max_texture_bytes,
          std::uint64_t cache_textures_above, std::uint64_t max_vertices, std::uint64_t max_triangles,
-         float luminous_efficacy) {
+         float luminous_efficacy, std::array<double, 3> origin) {
         return load_scene(path.text, {{max_vertices, max_triangles},
                                       max_texture_side,
                                       max_texture_bytes,
                                       cache_textures_above,
-                                      luminous_efficacy});
+                                      luminous_efficacy,
+                                      {origin[0], origin[1], origin[2]}});
       },
       nb::arg("path"), nb::kw_only(), nb::arg("max_texture_side") = SceneOptions{}.max_texture_side,
       nb::arg("max_texture_bytes") = SceneOptions{}.max_texture_bytes,
       nb::arg("cache_textures_above") = SceneOptions{}.cache_textures_above,
       nb::arg("max_vertices") = MeshLimits{}.max_vertices,
       nb::arg("max_triangles") = MeshLimits{}.max_triangles, nb::arg("luminous_efficacy") = 1.0F,
-      nb::call_guard<nb::gil_scoped_release>(),
+      nb::arg("origin") = std::array{0.0, 0.0, 0.0}, nb::call_guard<nb::gil_scoped_release>(),
       "Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,\n"
       "materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in "
       "memory\n"
       "are read through the cache of texture files. glTF's candela, lux and nits are divided by\n"
-      "`luminous_efficacy` (lumens per watt). Raises FileError if a file is missing, corrupt, beyond a limit "
+      "`luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's "
+      "zero, "
+      "before\npositions are rounded to float32. Raises FileError if a file is missing, corrupt, beyond a "
+      "limit "
       "or\n"
       "refers to files outside its directory.");
   m.def(
@@ -252,12 +277,19 @@ void bind_scene(nb::module_& m) {
   bind_mesh(m);
   bind_shapes(m);
   bind_visibility(m);
+  bind_winding(m);
 
   nb::class_<Scene>(
       m, "Scene",
       "Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours and\n"
       "radiance are scene-linear with Rec.709 primaries. The add_ functions return the new thing's index.")
       .def(nb::init<>())
+      .def(
+          "translate",
+          [](Scene& scene, std::array<double, 3> by) {
+            translate(scene, {by[0], by[1], by[2]});
+          },
+          nb::arg("by"), "Move everything that has a place: objects, and lights that are not at infinity.")
       .def(
           "add_texture",
           [](Scene& scene, const RgbImage& pixels, TextureWrap wrap_u, TextureWrap wrap_v) {
@@ -290,10 +322,8 @@ void bind_scene(nb::module_& m) {
               nb::gil_scoped_release released;
               image = texture_image(chosen);
             }
-            const std::size_t channels = image.channels.size();
-            const auto height = static_cast<std::size_t>(image.height);
-            const auto width = static_cast<std::size_t>(image.width);
-            return to_numpy(std::move(image.pixels), {height, width, channels});
+            const auto [width, height] = std::pair<std::size_t, std::size_t>(image.width, image.height);
+            return to_numpy(std::move(image.pixels), {height, width, image.channels.size()});
           },
           nb::arg("texture"),
           "Copy of a texture's texels, (height, width, 3), or (height, width, 1) for one channel that "

@@ -1,6 +1,8 @@
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -62,7 +64,14 @@ void bind_samples(nb::module_& m) {
   def_scalars<&S::triangle>(c, "triangle", "(n,) uint32: triangle of the reflector's mesh.");
   def_vectors<&S::barycentric>(c, "barycentric",
                                "(n, 2): weights of the triangle's second and third vertex.");
-  def_vectors<&S::position>(c, "position", "(n, 3): world space, metres.");
+  def_vectors<&S::position>(c, "position", "(n, 3): metres, relative to `origin`.");
+  c.def_prop_ro(
+      "origin",
+      [](const SurfaceSamples& s) {
+        return std::array{s.origin.x, s.origin.y, s.origin.z};
+      },
+      nb::sig("def origin(self) -> tuple[float, float, float]"),
+      "Where in the scene the positions' zero is: 0, but for scenes far from their own zero.");
   def_vectors<&S::normal>(c, "normal", "(n, 3): unit shading normal, towards the eye.");
   def_vectors<&S::reflection>(c, "reflection", "(n, 3): unit direction r = 2(n·v)n - v.");
   def_vectors<&S::dposition_dx>(c, "dposition_dx", "(n, 3): change of `position` per pixel to the right.");

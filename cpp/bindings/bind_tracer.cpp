@@ -75,12 +75,41 @@ void bind_tracer(nb::module_& m) {
       .def_rw("seed", &TracerOptions::seed, "Of the cache.");
   record(tracer_options, {"indirect", "cache_rays", "cache_bounces", "seed"});
 
+  nb::class_<ShellRule> shell_rule(
+      m, "ShellRule",
+      "What one shell of a reflector's environment holds: the things that a reflected ray "
+      "meets first, as the\nfirst rule of a list says that they match. The last rule takes "
+      "the rest, and the background.");
+  shell_rule
+      .def(
+          "__init__",
+          [](ShellRule* self, std::string name, std::vector<int> objects, float nearer_than) {
+            new (self) ShellRule{std::move(name), std::move(objects), nearer_than};
+          },
+          nb::arg("name"), nb::arg("objects") = std::vector<int>{},
+          nb::arg("nearer_than") = ShellRule{}.nearer_than)
+      .def_rw("name", &ShellRule::name, "Letters, digits, _ and -.")
+      .def_rw("objects", &ShellRule::objects,
+              "Numbers of objects, ITSELF for the reflector; empty: any, and lights.")
+      .def_rw("nearer_than", &ShellRule::nearer_than, "Along the reflected ray, metres, more than 0.")
+      .def_prop_ro_static(
+          "ITSELF", [](nb::handle) { return ShellRule::kItself; },
+          "The reflector, as an entry of `objects`.")
+      .def(
+          "__eq__", [](const ShellRule& a, const ShellRule& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"));
+  record(shell_rule, {"name", "objects", "nearer_than"});
+  m.def("default_shell_rules", &default_shell_rules,
+        "`local`, the reflector itself, and `distant`, the rest.");
+  m.attr("MOST_SHELLS") = kMostShells;
+
   nb::class_<TraceOptions> trace_options(m, "TraceOptions", "What is decided per image.");
   trace_options
       .def(
           "__init__",
           [](TraceOptions* self, int samples_per_pixel, int max_specular_depth, int max_diffuse_depth,
-             std::uint64_t seed, std::array<int, 4> window, float noise, int most_samples_per_pixel) {
+             std::uint64_t seed, std::array<int, 4> window, float noise, int most_samples_per_pixel,
+             std::vector<ShellRule> shells) {
             new (self) TraceOptions{samples_per_pixel,
                                     max_specular_depth,
                                     max_diffuse_depth,
@@ -88,6 +117,7 @@ void bind_tracer(nb::module_& m) {
                                     {window[0], window[1], window[2], window[3]},
                                     noise,
                                     most_samples_per_pixel,
+                                    std::move(shells),
                                     {}};
           },
           nb::kw_only(), nb::arg("samples_per_pixel") = TraceOptions{}.samples_per_pixel,
@@ -95,7 +125,8 @@ void bind_tracer(nb::module_& m) {
           nb::arg("max_diffuse_depth") = TraceOptions{}.max_diffuse_depth,
           nb::arg("seed") = TraceOptions{}.seed, nb::arg("window") = std::array<int, 4>{0, 0, 0, 0},
           nb::arg("noise") = TraceOptions{}.noise,
-          nb::arg("most_samples_per_pixel") = TraceOptions{}.most_samples_per_pixel)
+          nb::arg("most_samples_per_pixel") = TraceOptions{}.most_samples_per_pixel,
+          nb::arg("shells") = default_shell_rules())
       .def_rw("samples_per_pixel", &TraceOptions::samples_per_pixel, "1 to 65536.")
       .def_rw("max_specular_depth", &TraceOptions::max_specular_depth,
               "Specular bounces after the first, 0 to 64.")
@@ -107,6 +138,8 @@ void bind_tracer(nb::module_& m) {
               "takes more\nsamples where they are needed.")
       .def_rw("most_samples_per_pixel", &TraceOptions::most_samples_per_pixel,
               "Of trace_layers with `noise`, 1 to 65536.")
+      .def_rw("shells", &TraceOptions::shells,
+              "How trace_layers splits the incident light, front to back: 1 to MOST_SHELLS rules.")
       .def_prop_rw(
           "window",
           [](const TraceOptions& o) {
@@ -117,7 +150,7 @@ void bind_tracer(nb::module_& m) {
           },
           "x, y, width, height of the part of the image to trace, in pixels; of no size: everything.");
   record(trace_options, {"samples_per_pixel", "max_specular_depth", "max_diffuse_depth", "seed", "noise",
-                         "most_samples_per_pixel", "window"});
+                         "most_samples_per_pixel", "shells", "window"});
 
   nb::class_<BeautyTrace>(m, "BeautyTrace", "An image that was traced until its noise was below a limit.")
       .def_prop_ro(

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 import enum
 import os
-from typing import Annotated, Literal, overload
+from typing import Annotated, Final, Literal, overload
 
 import numpy
 import numpy.typing
@@ -650,6 +650,17 @@ class Visibility(enum.Flag):
 
     all = 7
 
+def winding_number(mesh: TriangleMesh, point: Sequence[float]) -> float:
+    """
+    How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van Oosterom
+    and Strackee 1983). Exactly 0 outside of the bounding box.
+    """
+
+def encloses(mesh: TriangleMesh, point: Sequence[float]) -> bool:
+    """
+    Whether a point, such as an eye, lies inside of a body: whether it winds about it more than half.
+    """
+
 class Scene:
     """
     Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours and
@@ -657,6 +668,11 @@ class Scene:
     """
 
     def __init__(self) -> None: ...
+
+    def translate(self, by: Sequence[float]) -> None:
+        """
+        Move everything that has a place: objects, and lights that are not at infinity.
+        """
 
     def add_texture(self, pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], wrap_u: Literal['repeat', 'clamp', 'mirror'] = 'repeat', wrap_v: Literal['repeat', 'clamp', 'mirror'] = 'repeat') -> int:
         """
@@ -815,12 +831,13 @@ class LoadedScene:
     @property
     def warnings(self) -> list[SceneWarning]: ...
 
-def load_scene(path: str | os.PathLike[str], *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, cache_textures_above: int = 67108864, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0) -> LoadedScene:
+def load_scene(path: str | os.PathLike[str], *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, cache_textures_above: int = 67108864, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0, origin: Sequence[float] = [0.0, 0.0, 0.0]) -> LoadedScene:
     """
     Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,
     materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in memory
     are read through the cache of texture files. glTF's candela, lux and nits are divided by
-    `luminous_efficacy` (lumens per watt). Raises FileError if a file is missing, corrupt, beyond a limit or
+    `luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's zero, before
+    positions are rounded to float32. Raises FileError if a file is missing, corrupt, beyond a limit or
     refers to files outside its directory.
     """
 
@@ -898,7 +915,13 @@ class SurfaceSamples:
 
     @property
     def position(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
-        """(n, 3): world space, metres."""
+        """(n, 3): metres, relative to `origin`."""
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """
+        Where in the scene the positions' zero is: 0, but for scenes far from their own zero.
+        """
 
     @property
     def normal(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
@@ -1065,10 +1088,55 @@ class TracerOptions:
 
     def __setstate__(self, arg: dict, /) -> None: ...
 
+class ShellRule:
+    """
+    What one shell of a reflector's environment holds: the things that a reflected ray meets first, as the
+    first rule of a list says that they match. The last rule takes the rest, and the background.
+    """
+
+    def __init__(self, name: str, objects: Sequence[int] = [], nearer_than: float = float('inf')) -> None: ...
+
+    @property
+    def name(self) -> str:
+        """Letters, digits, _ and -."""
+
+    @name.setter
+    def name(self, arg: str, /) -> None: ...
+
+    @property
+    def objects(self) -> list[int]:
+        """Numbers of objects, ITSELF for the reflector; empty: any, and lights."""
+
+    @objects.setter
+    def objects(self, arg: Sequence[int], /) -> None: ...
+
+    @property
+    def nearer_than(self) -> float:
+        """Along the reflected ray, metres, more than 0."""
+
+    @nearer_than.setter
+    def nearer_than(self, arg: float, /) -> None: ...
+
+    ITSELF: Final[int] = ...
+    """The reflector, as an entry of `objects`."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __repr__(self) -> str: ...
+
+    def __getstate__(self) -> dict: ...
+
+    def __setstate__(self, arg: dict, /) -> None: ...
+
+def default_shell_rules() -> list[ShellRule]:
+    """`local`, the reflector itself, and `distant`, the rest."""
+
+MOST_SHELLS: int = 8
+
 class TraceOptions:
     """What is decided per image."""
 
-    def __init__(self, *, samples_per_pixel: int = 16, max_specular_depth: int = 8, max_diffuse_depth: int = 4, seed: int = 0, window: Sequence[int] = [0, 0, 0, 0], noise: float = 0.0, most_samples_per_pixel: int = 256) -> None: ...
+    def __init__(self, *, samples_per_pixel: int = 16, max_specular_depth: int = 8, max_diffuse_depth: int = 4, seed: int = 0, window: Sequence[int] = [0, 0, 0, 0], noise: float = 0.0, most_samples_per_pixel: int = 256, shells: Sequence[ShellRule] = ...) -> None: ...
 
     @property
     def samples_per_pixel(self) -> int:
@@ -1113,6 +1181,15 @@ class TraceOptions:
 
     @most_samples_per_pixel.setter
     def most_samples_per_pixel(self, arg: int, /) -> None: ...
+
+    @property
+    def shells(self) -> list[ShellRule]:
+        """
+        How trace_layers splits the incident light, front to back: 1 to MOST_SHELLS rules.
+        """
+
+    @shells.setter
+    def shells(self, arg: Sequence[ShellRule], /) -> None: ...
 
     @property
     def window(self) -> list[int]:

@@ -23,7 +23,7 @@ ALLOWED["prefilter"] = ALLOWED["envmap"] | {"envmap"}
 ALLOWED["surface"] = ALLOWED["envmap"] | {"envmap"}
 ALLOWED["scene"] = {"core", "image", "shading"}
 # captures the world into a projection, records where the reflector is seen
-ALLOWED["tracer"] = ALLOWED["scene"] | {"scene", "projection", "surface"}
+ALLOWED["tracer"] = ALLOWED["scene"] | ALLOWED["surface"] | {"scene", "surface"}
 ALLOWED["inference"] = ALLOWED["surface"] | {"surface"}  # never the tracer
 ALLOWED["pem"] = set(ALLOWED)
 

@@ -10,7 +10,7 @@ import pytest
 
 from mirrorbake import _core
 from mirrorbake.errors import InputError
-from mirrorbake.scene.build import build_scene, winding_number
+from mirrorbake.scene.build import build_scene
 from mirrorbake.scene.cameras import Cameras
 from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.load import parse_config
@@ -63,14 +63,13 @@ def test_rotations_turn_counter_clockwise_about_each_axis_in_turn() -> None:
 
 def test_a_closed_mesh_winds_once_about_inner_points_and_not_about_outer_ones() -> None:
     sphere = _core.make_sphere((1.0, 2.0, 3.0), 0.5, 32)
-    positions, triangles = np.asarray(sphere.positions), np.asarray(sphere.triangles)
     random = np.random.default_rng(0)
     for direction in random.normal(size=(20, 3)):
         unit = direction / np.linalg.norm(direction)
         inner, outer = np.array([1, 2, 3]) + 0.48 * unit, np.array([1, 2, 3]) + 0.51 * unit
         # The mesh is float32 and its poles are slivers: 1e-4 is far from the threshold of 1/2.
-        assert winding_number(positions, triangles, inner) == pytest.approx(1.0, abs=1e-4)
-        assert winding_number(positions, triangles, outer) == pytest.approx(0.0, abs=1e-4)
+        assert _core.winding_number(sphere, inner) == pytest.approx(1.0, abs=1e-4)
+        assert _core.winding_number(sphere, outer) == pytest.approx(0.0, abs=1e-4)
 
 
 def test_the_eye_walks_an_arc_about_the_vertical() -> None:
@@ -113,7 +112,7 @@ def test_a_mesh_can_be_turned_and_scaled(cuboid: str) -> None:
     built = build(reflector={"mesh": cuboid, "scale": 0.1, "rotation": [-90, 0, 0]})
     np.testing.assert_allclose(built.positions.min(axis=0), (-0.05, 0.0, -0.1), atol=1e-6)
     np.testing.assert_allclose(built.positions.max(axis=0), (0.05, 0.4, 0.1), atol=1e-6)
-    assert winding_number(built.positions, built.triangles, np.array([0, 0.2, 0])) == pytest.approx(1)
+    assert _core.encloses(built.scene.object_mesh(built.reflector), (0, 0.2, 0))
 
 
 def test_a_flat_mesh_has_no_height_to_scale_to(tmp_path: Path) -> None:

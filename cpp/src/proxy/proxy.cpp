@@ -61,6 +61,18 @@ void check_shape(const Hemisphere& dome) {
 
 }  // namespace
 
+Proxy translated(const Proxy& proxy, glm::dvec3 by) {
+  const auto move = [by](glm::vec3& p) { p = glm::vec3(glm::dvec3(p) + by); };
+  Proxy result = proxy;
+  move(result.origin);
+  std::visit(
+      [&](auto& shape) {
+        if constexpr (!std::is_same_v<std::decay_t<decltype(shape)>, InfiniteSphere>) move(shape.centre);
+      },
+      result.shape);
+  return result;
+}
+
 void validate(const Proxy& proxy) {
   check_finite("proxy origin", proxy.origin);
   std::visit(

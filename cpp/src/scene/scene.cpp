@@ -344,6 +344,17 @@ void validate(const TriangleMesh& mesh) {
   check_mesh("mesh", mesh, std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1);
 }
 
+void translate(Scene& scene, glm::dvec3 by) {
+  const auto move = [by](glm::vec3& p) { p = glm::vec3(glm::dvec3(p) + by); };
+  for (Object& object : scene.objects) {
+    for (glm::vec3& p : object.mesh.positions) move(p);
+  }
+  for (RectangleLight& light : scene.rectangle_lights) move(light.corner);
+  for (SphereLight& light : scene.sphere_lights) move(light.centre);
+  for (PointLight& light : scene.point_lights) move(light.position);
+  for (SpotLight& light : scene.spot_lights) move(light.position);
+}
+
 Bounds bounds(const TriangleMesh& mesh) {
   if (mesh.positions.empty()) throw InvalidArgument("mesh vertex count", "0", "at least one vertex");
   Bounds box{mesh.positions.front(), mesh.positions.front()};

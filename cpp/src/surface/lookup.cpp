@@ -6,8 +6,9 @@
 
 namespace mirrorbake {
 
-Footprint lookup_footprint(const SurfaceSamples& samples, std::size_t i, const Proxy& proxy,
+Footprint lookup_footprint(const SurfaceSamples& samples, std::size_t i, const Proxy& in_scene,
                            float footprint_scale) {
+  const Proxy proxy = samples.origin == glm::dvec3(0.0) ? in_scene : translated(in_scene, -samples.origin);
   const glm::vec3 p = samples.position[i];
   const glm::vec3 r = samples.reflection[i];
   const float s = footprint_scale;

@@ -1,12 +1,9 @@
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
-#include <glm/vector_relational.hpp>
+#include <glm/vec3.hpp>
 
 #include "camera_rays.hpp"
 #include "integrator.hpp"
@@ -18,6 +15,7 @@
 #include "primary_rays.hpp"
 #include "progress.hpp"
 #include "sample_rows.hpp"
+#include "shell_rays.hpp"
 #include "state.hpp"
 
 namespace mirrorbake {
@@ -25,6 +23,7 @@ namespace {
 
 using tracing::CameraRays;
 using tracing::Hit;
+using tracing::IncidentShells;
 using tracing::LitWorld;
 using tracing::PathLimits;
 using tracing::PixelLayers;
@@ -35,58 +34,11 @@ using tracing::RayKind;
 using tracing::RayScene;
 using tracing::Row;
 using tracing::SampleStream;
-using tracing::SpecularLayers;
+using tracing::ShellRays;
 using tracing::Surface;
 using tracing::World;
 
 bool meets(const Hit& hit, int object) { return !hit.missed() && static_cast<int>(hit.geometry) == object; }
-
-/// `lobe` is what next-event estimation found for the lobe.
-SpecularLayers trace_specular(const LitWorld& lit, const RayScene::View& without_reflector,
-                              const Surface& surface, glm::vec3 lobe, const PathLimits& limits,
-                              const SampleStream& stream) {
-  const World& world = lit.world;
-  SpecularLayers layers;
-  if (!surface.specular()) return layers;
-  layers.distant = lobe;
-  const tracing::SpecularBounce bounce = tracing::specular_bounce(surface, stream, 0);
-  if (bounce.weight == glm::vec3(0.0F)) return layers;
-  const Ray ray{tracing::offset_origin(surface, bounce.direction), bounce.direction};
-  Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
-  if (meets(hit, surface.object)) {
-    const glm::vec3 incident = tracing::radiance(lit, ray, hit, limits, stream, 1, bounce.pdf);
-    layers.local = glm::vec4(lobe + bounce.weight * incident, 1.0F);
-    layers.local_distance = hit.distance;
-    hit = without_reflector.intersect(ray, RayKind::reflection);
-  }
-  layers.distant += bounce.weight * tracing::radiance(lit, ray, hit, limits, stream, 1, bounce.pdf);
-  layers.distant_distance = hit.distance;
-  return layers;
-}
-
-// From inside a body most directions meet the back of its surface first. Bodies need not be closed (the
-// teapot is open under its lid), so this asks for a majority rather than for a parity of crossings.
-void check_eye_outside(const World& world, const Camera& camera, int reflector) {
-  const glm::vec3 eye = camera.eye - world.rays.origin();
-  const Bounds& box = world.rays.object_bounds(reflector);
-  if (glm::any(glm::lessThan(eye, box.min)) || glm::any(glm::greaterThan(eye, box.max))) return;
-  constexpr int kProbes = 128;
-  int backs = 0;
-  for (std::uint32_t i = 0; i < kProbes; ++i) {
-    const glm::vec2 u = sobol_2d(i, 0);
-    const float y = 1.0F - 2.0F * u.x;
-    const float radius = std::sqrt(std::max(0.0F, 1.0F - y * y));
-    const float angle = 6.2831853F * u.y;
-    const Ray ray{eye, glm::normalize(glm::vec3(radius * std::cos(angle), y, radius * std::sin(angle)))};
-    const Hit hit = world.rays.all().intersect(ray, RayKind::camera);
-    if (hit.missed() || static_cast<int>(hit.geometry) != reflector) continue;
-    if (!tracing::surface_at(world.scene, world.rays, hit, ray.direction).front) ++backs;
-  }
-  if (2 * backs > kProbes) {
-    throw InvalidArgument("camera.eye", "inside object " + std::to_string(reflector),
-                          "a point outside the reflector");
-  }
-}
 
 void check_reflector(const World& world, const Camera& camera, int reflector) {
   const auto count = static_cast<int>(world.scene.objects.size());
@@ -98,7 +50,10 @@ void check_reflector(const World& world, const Camera& camera, int reflector) {
   if (!is_specular(world.scene, object)) {
     throw InvalidArgument("reflector", "'" + object.name + "'", "an object with a specular material");
   }
-  check_eye_outside(world, camera, reflector);
+  if (encloses(object.mesh, glm::dvec3(camera.eye))) {
+    throw InvalidArgument("camera.eye", "inside object " + std::to_string(reflector),
+                          "a point outside the reflector");
+  }
 }
 
 /// The samples of row `y` of the window.
@@ -142,13 +97,15 @@ class LayerTracer {
         rows_(reflectors.size()) {
     for (std::size_t r = 0; r < reflectors.size(); ++r) {
       number_of_object_[static_cast<std::size_t>(reflectors[r])] = static_cast<int>(r);
-      without_.push_back(lit.world.rays.without({&reflectors[r], 1}));
-      traces_[r].layers = Image(window.width, window.height, tracing::layer_channels());
+      shell_rays_.emplace_back(lit.world, options.shells, reflectors[r]);
+      traces_[r].layers = Image(window.width, window.height, tracing::layer_channels(options.shells));
       const std::size_t pixels =
           static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
       traces_[r].display_variance.resize(pixels);
       rows_[r].resize(static_cast<std::size_t>(window.height));
-      for (Row& row : rows_[r]) row.samples.shells = tracing::default_shells();
+      for (Row& row : rows_[r]) {
+        for (const ShellRule& shell : options.shells) row.samples.shells.push_back({shell.name, {}, {}});
+      }
     }
   }
 
@@ -161,6 +118,10 @@ class LayerTracer {
 
  private:
   using Pixels = std::vector<std::vector<PixelLayers>>;  // per reflector
+
+  Pixels empty_pixels(std::size_t count) const {
+    return Pixels(traces_.size(), std::vector<PixelLayers>(count, PixelLayers(options_.shells.size())));
+  }
 
   /// A piece of an image row, in pixels of the image.
   struct Piece {
@@ -186,7 +147,7 @@ class LayerTracer {
   const TraceOptions& options_;
   PathLimits limits_;
   std::vector<int> number_of_object_;
-  std::vector<RayScene::View> without_;  // each reflector
+  std::vector<ShellRays> shell_rays_;  // per reflector
   std::vector<LayerTrace> traces_;
   std::vector<std::vector<Row>> rows_;  // of the window, per reflector
   std::vector<std::uint32_t> pixel_samples_;
@@ -206,21 +167,21 @@ void LayerTracer::add_sample(const PrimarySample& sample, int x, int y, std::siz
   const tracing::ScatteredLight scattered =
       tracing::scattered_light(lit_, surface, limits_, sample.stream, 0);
   const glm::vec3 body = surface.emission + scattered.body;
-  const SpecularLayers specular =
-      trace_specular(lit_, without_[r], surface, scattered.lobe, limits_, sample.stream);
-  const glm::vec3 value = body + surface.fresnel * specular.incident();
+  const IncidentShells incident = shell_rays_[r].trace(lit_, surface, scattered.lobe, limits_, sample.stream);
+  const glm::vec3 value = body + surface.fresnel * incident.light();
   for (std::size_t other = 0; other < pixels.size(); ++other) {
     if (other != r) pixels[other][pixel].add_other(value);
   }
   const std::vector<std::uint16_t>& parts = world.scene.objects[sample.hit.geometry].mesh.parts;
   const std::uint16_t part = parts.empty() ? std::uint16_t{0} : parts[surface.triangle];
-  pixels[r][pixel].add(surface, value, body, specular, surface.position + world.rays.origin(), part);
+  pixels[r][pixel].add(surface, value, body, incident,
+                       glm::dvec3(surface.position) + glm::dvec3(world.rays.origin()), part);
   if (!in_window(x, y)) return;
   Row& row = rows_[r][static_cast<std::size_t>(y - window_.y)];
   tracing::record_surface(row.samples, world, surface, sample.hit.distance,
                           rays_.direction_with_differentials(sample.point),
                           pixel_number(window_, static_cast<std::size_t>(y - window_.y), x - window_.x));
-  tracing::record_light(row.samples, body, specular);
+  tracing::record_light(row.samples, body, incident);
   row.beauty.push_back(value);
 }
 
@@ -254,7 +215,7 @@ void LayerTracer::trace() {
   tracing::ProgressCounter progress(options_, static_cast<std::size_t>(window_.height));
   parallel_for(static_cast<std::size_t>(window_.height), 1, [&](std::size_t begin, std::size_t end) {
     for (auto y = window_.y + static_cast<int>(begin); y < window_.y + static_cast<int>(end); ++y) {
-      Pixels pixels(traces_.size(), std::vector<PixelLayers>(static_cast<std::size_t>(window_.width)));
+      Pixels pixels = empty_pixels(static_cast<std::size_t>(window_.width));
       trace_piece({y, window_.x, window_.width, 0, options_.samples_per_pixel}, 0, pixels);
       for (int x = 0; x < window_.width; ++x) write(window_.x + x, y, static_cast<std::size_t>(x), pixels);
       progress.step();
@@ -299,7 +260,7 @@ void LayerTracer::trace_to_noise() {
   area.height = std::min(camera_.height, window_.y + window_.height + 1) - area.y;
   const auto width = static_cast<std::size_t>(area.width);
   const auto height = static_cast<std::size_t>(area.height);
-  Pixels pixels(traces_.size(), std::vector<PixelLayers>(width * height));
+  Pixels pixels = empty_pixels(width * height);
   tracing::ProgressCounter progress(options_, height + static_cast<std::size_t>(window_.height));
   parallel_for(height, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
@@ -333,7 +294,7 @@ void LayerTracer::trace_to_noise() {
 
 std::vector<LayerTrace> LayerTracer::take() {
   for (std::size_t r = 0; r < traces_.size(); ++r) {
-    traces_[r].samples = tracing::concatenate(rows_[r], window_, options_);
+    traces_[r].samples = tracing::concatenate(rows_[r], window_, options_, lit_.world.rays.origin());
     traces_[r].samples.pixel_samples = pixel_samples_;
     traces_[r].sample_beauty.reserve(traces_[r].samples.size());
     for (const Row& row : rows_[r]) {
@@ -355,6 +316,7 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
   validate(camera);
   tracing::validate(options);
   const PixelWindow window = tracing::window_in(options, camera.width, camera.height);
+  tracing::check_shells(options.shells, world.scene.objects.size());
   std::vector<bool> seen(world.scene.objects.size(), false);
   for (int reflector : reflectors) {
     check_reflector(world, camera, reflector);
@@ -405,7 +367,7 @@ SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
       }
     }
   });
-  return tracing::concatenate(rows, window, options);
+  return tracing::concatenate(rows, window, options, world.rays.origin());
 }
 
 }  // namespace mirrorbake

@@ -29,8 +29,8 @@ void PixelLayers::plan(int samples) {
   planned_ = samples;
 }
 
-void PixelLayers::add(const Surface& s, glm::vec3 beauty, glm::vec3 body, const SpecularLayers& specular,
-                      glm::vec3 position, std::uint16_t part) {
+void PixelLayers::add(const Surface& s, glm::vec3 beauty, glm::vec3 body, const IncidentShells& incident,
+                      glm::dvec3 position, std::uint16_t part) {
   Quarter& quarter = quarters_[static_cast<std::size_t>(4 * static_cast<std::int64_t>(taken_) / planned_)];
   quarter.beauty += beauty;
   ++quarter.covered;
@@ -38,10 +38,10 @@ void PixelLayers::add(const Surface& s, glm::vec3 beauty, glm::vec3 body, const 
   ++covered_;
   diffuse_ += body;
   fresnel_ += s.fresnel;
-  local_ += specular.local;
-  distant_ += specular.distant;
-  if (std::isfinite(specular.distant_distance)) {
-    distance_ += specular.distant_distance;
+  for (std::size_t k = 0; k < shells_.size(); ++k) shells_[k] += incident.shells[k].radiance;
+  const float distance = incident.shells[shells_.size() - 1].distance;
+  if (std::isfinite(distance)) {
+    distance_ += distance;
     ++finite_distances_;
   }
   reflection_ += s.reflection;
@@ -86,8 +86,13 @@ void PixelLayers::write(float* out) const {
   *out++ = static_cast<float>(covered_) / static_cast<float>(planned_);
   put(diffuse_, share);
   put(fresnel_, share);
-  put(local_, share);
-  put(distant_, share);
+  for (const glm::dvec4& shell : shells_) {
+    if (&shell != &shells_.back()) {
+      put(shell, share);
+    } else {
+      put(glm::dvec3(shell), share);
+    }
+  }
   *out++ = covered_ == 0            ? 0.0F
            : finite_distances_ == 0 ? std::numeric_limits<float>::infinity()
                                     : static_cast<float>(distance_ / finite_distances_);
@@ -95,9 +100,13 @@ void PixelLayers::write(float* out) const {
   put(normal_, share);
   put(position_, share);
   *out++ = static_cast<float>(most_frequent_part());
-  const glm::dvec3 of_means =
-      diffuse_ + fresnel_ * share * (glm::dvec3(local_) + (1.0 - local_.a * share) * distant_);
-  put(beauty - of_means, share);
+  glm::dvec3 incident(0.0);
+  double transmittance = 1.0;
+  for (const glm::dvec4& shell : shells_) {
+    incident += transmittance * glm::dvec3(shell);
+    transmittance *= 1.0 - shell.a * share;
+  }
+  put(beauty - (diffuse_ + fresnel_ * share * incident), share);
   put(background_, 1.0 / planned_);
 }
 
@@ -117,41 +126,22 @@ int PixelLayers::most_frequent_part() const {
   return best;
 }
 
-std::vector<std::string> layer_channels() {
-  return {"R",
-          "G",
-          "B",
-          "coverage",
-          "diffuse.R",
-          "diffuse.G",
-          "diffuse.B",
-          "fresnel.R",
-          "fresnel.G",
-          "fresnel.B",
-          "specular_local.R",
-          "specular_local.G",
-          "specular_local.B",
-          "specular_local.A",
-          "specular_distant.R",
-          "specular_distant.G",
-          "specular_distant.B",
-          "distance",
-          "reflection.X",
-          "reflection.Y",
-          "reflection.Z",
-          "normal.X",
-          "normal.Y",
-          "normal.Z",
-          "position.X",
-          "position.Y",
-          "position.Z",
-          "part",
-          "covariance.R",
-          "covariance.G",
-          "covariance.B",
-          "background.R",
-          "background.G",
-          "background.B"};
+std::vector<std::string> layer_channels(std::span<const ShellRule> shells) {
+  std::vector<std::string> names{"R", "G", "B", "coverage"};
+  const auto add = [&](const std::string& layer, const char* channels) {
+    for (; *channels != 0; ++channels) names.push_back(layer + "." + *channels);
+  };
+  add("diffuse", "RGB");
+  add("fresnel", "RGB");
+  for (const ShellRule& shell : shells) {
+    add("specular_" + shell.name, &shell == &shells.back() ? "RGB" : "RGBA");
+  }
+  names.emplace_back("distance");
+  for (const char* layer : {"reflection", "normal", "position"}) add(layer, "XYZ");
+  names.emplace_back("part");
+  add("covariance", "RGB");
+  add("background", "RGB");
+  return names;
 }
 
 }  // namespace mirrorbake::tracing

@@ -2,37 +2,29 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
+#include <span>
 #include <string>
 #include <vector>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include "shell_rays.hpp"
 #include "surface.hpp"
 
 namespace mirrorbake::tracing {
 
-/// The light that arrives along a direction of the specular lobe, split by what the ray hits first, with the
-/// distance along the direction to what each layer's ray hits.
-struct SpecularLayers {
-  glm::vec4 local{0.0F};
-  glm::vec3 distant{0.0F};
-  float local_distance = std::numeric_limits<float>::infinity();
-  float distant_distance = std::numeric_limits<float>::infinity();
-
-  glm::vec3 incident() const { return glm::vec3(local) + (1.0F - local.a) * distant; }
-};
-
 /// Sums over the samples of a pixel for one reflector, then their means.
 class PixelLayers {
  public:
+  explicit PixelLayers(std::size_t shells) : shells_(shells, glm::dvec4(0.0)) {}
+
   /// Samples are told apart by quarters of the `planned` ones: each quarter of a power of two is stratified
   /// by itself, so that what the quarters differ by tells the error of their mean.
   void plan(int samples);
 
   /// The next sample sees the reflector, or something else.
-  void add(const Surface& s, glm::vec3 beauty, glm::vec3 body, const SpecularLayers& specular,
-           glm::vec3 position, std::uint16_t part);
+  void add(const Surface& s, glm::vec3 beauty, glm::vec3 body, const IncidentShells& incident,
+           glm::dvec3 position, std::uint16_t part);
   void add_other(glm::vec3 beauty);
 
   int covered() const { return covered_; }
@@ -57,13 +49,12 @@ class PixelLayers {
   int covered_ = 0;
   int finite_distances_ = 0;
   double distance_ = 0.0;
-  glm::dvec3 background_{0.0}, diffuse_{0.0}, fresnel_{0.0}, distant_{0.0}, reflection_{0.0}, normal_{0.0},
-      position_{0.0};
-  glm::dvec4 local_{0.0};
+  glm::dvec3 background_{0.0}, diffuse_{0.0}, fresnel_{0.0}, reflection_{0.0}, normal_{0.0}, position_{0.0};
+  std::vector<glm::dvec4> shells_;
   std::array<Quarter, 4> quarters_;
   std::vector<std::uint16_t> parts_;
 };
 
-std::vector<std::string> layer_channels();
+std::vector<std::string> layer_channels(std::span<const ShellRule> shells);
 
 }  // namespace mirrorbake::tracing

@@ -74,7 +74,7 @@ RTCRay to_embree(const Ray& ray, unsigned mask) {
   r.org_x = ray.origin.x;
   r.org_y = ray.origin.y;
   r.org_z = ray.origin.z;
-  r.tnear = 0.0F;
+  r.tnear = ray.min_distance;
   r.dir_x = ray.direction.x;
   r.dir_y = ray.direction.y;
   r.dir_z = ray.direction.z;

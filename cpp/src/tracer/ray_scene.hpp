@@ -18,6 +18,7 @@ struct Ray {
   glm::vec3 origin{0.0F};
   glm::vec3 direction{0.0F, 0.0F, 1.0F};  ///< unit
   float max_distance = std::numeric_limits<float>::infinity();
+  float min_distance = 0.0F;  ///< of single rays; packets start at their origins
 };
 
 /// Kinds of rays that see different sets of objects (Visibility).

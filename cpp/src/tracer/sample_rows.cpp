@@ -44,11 +44,13 @@ auto join(std::vector<Row>& rows, const Array& array) {
 
 }  // namespace
 
-SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, const TraceOptions& options) {
+SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, const TraceOptions& options,
+                           glm::dvec3 origin) {
   SurfaceSamples all;
   all.width = window.width;
   all.height = window.height;
   all.samples_per_pixel = options.samples_per_pixel;
+  all.origin = origin;
   for_each_array([&](auto member) {
     all.*member = join(
         rows, [member](SurfaceSamples & samples) -> auto& { return samples.*member; });
@@ -95,7 +97,7 @@ void record_surface(SurfaceSamples& out, const World& world, const Surface& s, f
   out.part.push_back(parts.empty() ? std::uint16_t{0} : parts[s.triangle]);
   out.triangle.push_back(s.triangle);
   out.barycentric.push_back(s.barycentric);
-  out.position.push_back(s.position + world.rays.origin());
+  out.position.push_back(s.position);
   out.normal.push_back(s.normal);
   out.reflection.push_back(s.reflection);
   const auto dx = surface_differential(world.scene, world.rays, s, distance, ray.dx);
@@ -109,14 +111,12 @@ void record_surface(SurfaceSamples& out, const World& world, const Surface& s, f
   out.emission.push_back(s.emission);
 }
 
-std::vector<ShellLight> default_shells() { return {{"local", {}, {}}, {"distant", {}, {}}}; }
-
-void record_light(SurfaceSamples& out, glm::vec3 body, const SpecularLayers& specular) {
+void record_light(SurfaceSamples& out, glm::vec3 body, const IncidentShells& incident) {
   out.diffuse.push_back(body);
-  out.shells[0].radiance.push_back(specular.local);
-  out.shells[0].hit_distance.push_back(specular.local_distance);
-  out.shells[1].radiance.emplace_back(specular.distant, 1.0F);
-  out.shells[1].hit_distance.push_back(specular.distant_distance);
+  for (std::size_t k = 0; k < out.shells.size(); ++k) {
+    out.shells[k].radiance.push_back(incident.shells[k].radiance);
+    out.shells[k].hit_distance.push_back(incident.shells[k].distance);
+  }
 }
 
 }  // namespace mirrorbake::tracing

@@ -19,17 +19,15 @@ struct Row {
   std::vector<glm::vec3> beauty;
 };
 
-/// The shells that the layers are recorded as, front to back.
-std::vector<ShellLight> default_shells();
-
 void record_surface(SurfaceSamples& out, const World& world, const Surface& s, float distance,
                     const CameraRays::Direction& ray, std::uint32_t pixel);
-void record_light(SurfaceSamples& out, glm::vec3 body, const SpecularLayers& specular);
+void record_light(SurfaceSamples& out, glm::vec3 body, const IncidentShells& incident);
 
 /// Behind the samples of every pixel's first round come those of the second: brings them together.
 void sort_by_pixel(Row& row);
 
-/// The rows one after the other. Empties them.
-SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, const TraceOptions& options);
+/// The rows one after the other, positions relative to `origin`. Empties them.
+SurfaceSamples concatenate(std::vector<Row>& rows, const PixelWindow& window, const TraceOptions& options,
+                           glm::dvec3 origin);
 
 }  // namespace mirrorbake::tracing

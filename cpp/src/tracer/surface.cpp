@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "barycentric.hpp"
+#include "mirrorbake/envmap/footprint.hpp"
 
 namespace mirrorbake::tracing {
 namespace {
@@ -221,8 +222,7 @@ SurfaceDifferential surface_differential(const Scene& scene, const RayScene& ray
     }
   }
   const glm::vec3 n = surface.normal;
-  result.reflection =
-      ddirection - 2.0F * (glm::dot(d, n) * dnormal + (glm::dot(ddirection, n) + glm::dot(d, dnormal)) * n);
+  result.reflection = reflected_differential(d, n, ddirection, dnormal);
   // Directions differ by 2 at most; a longer differential is an artefact of the linear extrapolation.
   const float length = glm::length(result.reflection);
   if (!(length <= 2.0F))

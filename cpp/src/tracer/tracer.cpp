@@ -23,6 +23,8 @@ const TracerOptions& validated(const TracerOptions& options) {
 
 }  // namespace
 
+std::vector<ShellRule> default_shell_rules() { return {{"local", {ShellRule::kItself}}, {"distant", {}}}; }
+
 Tracer::State::State(Scene scene, const TracerOptions& options)
     : lit((validated(scene), std::move(scene)), validated(options)) {}
 

@@ -268,7 +268,7 @@ def _lookup_steps(stage: Stage, proxy: _core.Proxy) -> DoubleArray:
         seen = moved.tracer.trace_visibility(
             moved.built.cameras.camera(point), moved.built.reflector, options
         )
-        position, reflection = np.asarray(seen.position, float), np.asarray(seen.reflection, float)
+        position, reflection = seen.position + np.array(seen.origin), np.asarray(seen.reflection, float)
         still = np.zeros_like(position)
         middle, right, below = (
             _unit(proxy.lookup_float64(position + part * np.asarray(dp), reflection + part * np.asarray(dr)))

@@ -84,7 +84,9 @@ class Probe:
             pixel=joined("pixel").astype(np.int64) + view.astype(np.int64) * (size[0] * size[1]),
             part=joined("part").astype(np.int64),
             triangle=joined("triangle").astype(np.int64),
-            position=joined("position"),
+            position=np.concatenate(
+                [trace.samples.position + np.array(trace.samples.origin) for trace in traces]
+            ).astype(np.float32),
             reflection=joined("reflection"),
             beauty=np.concatenate([np.asarray(trace.sample_beauty) for trace in traces]).astype(np.float64),
             diffuse=joined("diffuse").astype(np.float64),

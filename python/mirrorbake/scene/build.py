@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -81,7 +80,7 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     cameras = resolve_cameras(config.views, pose.at_rest(positions.astype(np.float64)))
     for sample in space.samples():
         eye = cameras.eye(sample)
-        if winding_number(positions, triangles, np.array(eye)) > 0.5:
+        if _core.encloses(mesh, eye):
             where = f"t = {format_point(sample)}" if len(sample) == 1 else format_point(sample)
             raise InputError(
                 f"views: the eye at {where}, {_vector(eye)}, lies inside the reflector; "
@@ -98,37 +97,6 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
         space=space,
         notes=notes,
     )
-
-
-def winding_number(positions: FloatArray, triangles: NDArray[np.uint32], point: NDArray[np.float64]) -> float:
-    """Return how often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between.
-
-    The sum of the triangles' signed solid angles over 4π (van Oosterom and Strackee, The solid angle of a
-    plane triangle, IEEE Trans. Biomed. Eng. 30(2), 1983).
-
-    Parameters
-    ----------
-    positions
-        Shape (V, 3).
-    triangles
-        Shape (T, 3), counter-clockwise seen from outside.
-    point
-        Shape (3,).
-    """
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    if np.any(point < low) or np.any(point > high):
-        return 0.0
-    corners = positions.astype(np.float64)[triangles] - point
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    numerator = np.einsum("ij,ij->i", a, np.cross(b, c))
-    denominator = (
-        la * lb * lc
-        + np.einsum("ij,ij->i", a, b) * lc
-        + np.einsum("ij,ij->i", b, c) * la
-        + np.einsum("ij,ij->i", c, a) * lb
-    )
-    return float(np.sum(2.0 * np.arctan2(numerator, denominator)) / (4.0 * math.pi))
 
 
 def _vector(v: tuple[float, float, float]) -> str:

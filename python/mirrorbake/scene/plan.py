@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 DECIDED_KEYS = (
     "trace.depth",
     "trace.samples",
-    "trace.noise",
     "layers.diffuse",
     "layers.local",
     "layers.hull_split",
     "maps.distant",
     "maps.size",
+    "trace.noise",
     "views.traced",
     "infer.passes",
     "infer.neighbours",

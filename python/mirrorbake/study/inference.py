@@ -97,7 +97,8 @@ class Lab:
             self.camera(self.view), built.reflector, _core.TraceOptions(samples_per_pixel=4)
         )
         distance = np.asarray(trace.samples.shells[1].hit_distance)
-        hits = np.asarray(trace.samples.position) + np.asarray(trace.samples.reflection) * distance[:, None]
+        seen = trace.samples
+        hits = seen.position + np.array(seen.origin) + np.asarray(seen.reflection) * distance[:, None]
         far = _core.fit_box_robust(hits[np.isfinite(distance)].astype(np.float32), origin)
         off_hull = (~hull_triangles(built.positions, built.triangles)).astype(np.uint8)
         parts: list[list[tuple[_core.Proxy, int, np.ndarray | None]]] = []

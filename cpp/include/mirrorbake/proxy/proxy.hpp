@@ -89,6 +89,9 @@ void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions
 void mirror_lookups(std::span<const Proxy> proxies, glm::vec3 eye, std::span<const glm::vec3> positions,
                     std::span<const glm::vec3> normals, std::span<glm::vec3> lookups);
 
+/// The proxy elsewhere, shape and origin.
+Proxy translated(const Proxy& proxy, glm::dvec3 by);
+
 /// Throws InvalidArgument, naming the field, if the proxy is not usable: extents not positive or not finite,
 /// axes not orthonormal (to 1e-4), origin not inside of the shape.
 void validate(const Proxy& proxy);

@@ -36,6 +36,9 @@ struct SceneOptions {
   /// glTF measures light in candela, lux and nits. Its numbers are divided by this many lumens per watt: 1
   /// takes them as they are, 683 gives watts of green light, as Blender's exporter assumes.
   float luminous_efficacy = 1.0F;
+  /// Place in the file's world that becomes the scene's zero, coordinates up to 1e12. It is subtracted before
+  /// positions are rounded to float, so that a scene far from its file's origin keeps its details.
+  glm::dvec3 origin{0.0};
 };
 
 /// A viewpoint that a scene file proposes.

@@ -225,6 +225,18 @@ void validate(const Scene& scene);
 /// The same for one mesh.
 void validate(const TriangleMesh& mesh);
 
+/// Moves everything that has a place: objects, and lights that are not at infinity.
+void translate(Scene& scene, glm::dvec3 by);
+
+/// How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between. The sum of the
+/// triangles' signed solid angles over 4π (van Oosterom and Strackee, The solid angle of a plane triangle,
+/// IEEE Trans. Biomed. Eng. 30(2), 1983). Exactly 0 outside of the bounding box.
+double winding_number(const TriangleMesh& mesh, glm::dvec3 point);
+
+/// Whether a point, such as an eye, lies inside of a body: whether the winding number is above ½, so that
+/// bodies need not be closed (the teapot is open under its lid).
+bool encloses(const TriangleMesh& mesh, glm::dvec3 point);
+
 /// Axis-aligned bounds of a mesh's vertices. Throws InvalidArgument if there are none.
 struct Bounds {
   glm::vec3 min{0.0F};

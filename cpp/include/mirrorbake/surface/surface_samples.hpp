@@ -28,6 +28,9 @@ struct SurfaceSamples {
   int width = 0;   ///< of the image, pixels
   int height = 0;  ///< of the image, pixels
   int samples_per_pixel = 0;
+  /// Where in the scene the positions' zero is: 0, but for scenes far from their own zero, where float
+  /// positions would be coarser than lookups may be.
+  glm::dvec3 origin{0.0};
   /// Samples traced per pixel, whatever they saw: one entry per pixel, or none if all are
   /// `samples_per_pixel`.
   std::vector<std::uint32_t> pixel_samples;
@@ -36,7 +39,7 @@ struct SurfaceSamples {
   std::vector<std::uint16_t> part;      ///< part of the reflector
   std::vector<std::uint32_t> triangle;  ///< of the reflector's mesh
   std::vector<glm::vec2> barycentric;   ///< weights of the triangle's second and third vertex
-  std::vector<glm::vec3> position;      ///< world space
+  std::vector<glm::vec3> position;      ///< relative to `origin`
   /// Unit shading normal, towards the eye. Where the mesh's interpolated normal would reflect the view into
   /// the surface it is bent until the reflection just leaves it.
   std::vector<glm::vec3> normal;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -43,6 +44,24 @@ struct PixelWindow {
   bool operator==(const PixelWindow&) const = default;
 };
 
+/// What one shell of a reflector's environment holds ([PEM] §4: "this method easily generalizes to more than
+/// two environmental shells"): the things that a reflected ray meets first, as the first rule says that they
+/// match. The last rule of a list takes all that the others leave, and the background.
+struct ShellRule {
+  static constexpr int kItself = -1;  ///< the reflector, as an entry of `objects`
+
+  std::string name;          ///< letters, digits, _ and −
+  std::vector<int> objects;  ///< numbers of objects, or kItself; empty: any, and lights
+  float nearer_than = std::numeric_limits<float>::infinity();  ///< along the reflected ray, metres, > 0
+
+  bool operator==(const ShellRule&) const = default;
+};
+
+/// [PEM] §4: `local`, the reflector itself, and `distant`, the rest.
+std::vector<ShellRule> default_shell_rules();
+
+inline constexpr std::size_t kMostShells = 8;
+
 struct TraceOptions {
   int samples_per_pixel = 16;  ///< 1…65536, stratified
   int max_specular_depth = 8;  ///< specular bounces after the first, 0…64; beyond it the reflection is black
@@ -56,6 +75,8 @@ struct TraceOptions {
   /// mean unbiased. samples_per_pixel must then be a multiple of 4. In [0, 1].
   float noise = 0.0F;
   int most_samples_per_pixel = 256;  ///< 1…65536
+  /// How trace_layers splits the incident light, front to back; 1 to kMostShells.
+  std::vector<ShellRule> shells = default_shell_rules();
   /// Called with the finished share of the work, in (0,1], from one thread at a time.
   std::function<void(double)> progress;
 };
@@ -72,21 +93,22 @@ struct BeautyTrace {
 
 /// The segmented layers of one reflector in one view ([PEM] §3, spec T4), averaged over each pixel: the
 /// channels are `R`, `G`, `B` for the beauty image, which has the surroundings too; `coverage`; `diffuse.R`
-/// …, `fresnel.R` …, `specular_local.R` … `specular_local.A`, `specular_distant.R` …, `distance`,
-/// `reflection.X` …, `normal.X` …, `position.X` …, means over the covered samples, 0 where there are none;
-/// `part`, the most frequent one, −1 for none; `covariance.R` …; and `background.R` …, the part of the beauty
-/// image that comes from other things than the reflector. `distance` averages the finite ones, and is +inf
-/// where all are infinite.
+/// …, `fresnel.R` …, `specular_local.R` … `specular_local.A`, `specular_distant.R` … (by the names of the
+/// shells, the last without α), `distance`, `reflection.X` …, `normal.X` …, `position.X` … in the scene,
+/// means over the covered samples, 0 where there are none; `part`, the most frequent one, −1 for none;
+/// `covariance.R` …; and `background.R` …, the part of the beauty image that comes from other things than the
+/// reflector. `distance`, of the last shell, averages the finite ones, and is +inf where all are infinite.
 ///
-/// Per sample, diffuse + fresnel · (local.rgb + (1 − local.a) · distant) is the beauty value up to float
-/// rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel: `covariance` is what has
-/// to be added to the same sum of means to get the mean beauty of the covered samples.
+/// A shell holds what the ray meets first of its own kind, with the kinds of the shells before it left out.
+/// Per sample, diffuse + fresnel · (L₀ + (1 − α₀)(L₁ + (1 − α₁)(…))) over the shells is the beauty value up
+/// to float rounding; α is 0 or 1. Means lose the covariance of the factors inside a pixel: `covariance` is
+/// what has to be added to the same sum of means to get the mean beauty of the covered samples.
 ///
 /// A rough reflector takes one direction of its lobe per sample. Its incident radiance is multiplied with the
 /// lobe's response for F = 1 over the direction's density, and with the Fresnel term of the facet over
 /// `fresnel`, which is that of the surface (spec T5). Lights that next-event estimation finds for the lobe
-/// are shared between the two ways by multiple importance sampling: the light's part is added to `distant`,
-/// and to `local` where α is 1.
+/// are shared between the two ways by multiple importance sampling: the light's part is added to the last
+/// shell, and to the others where α is 1.
 struct LayerTrace {
   Image layers;
   SurfaceSamples samples;  ///< with the traced light

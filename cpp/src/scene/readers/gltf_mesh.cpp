@@ -277,9 +277,9 @@ class GltfBuilder {
 }  // namespace
 
 LoadedMesh gltf::read_meshes(const std::string& path, const tinygltf::Model& model, const MeshLimits& limits,
-                             const UvSetOfMaterial& uv_set) {
+                             glm::dvec3 origin, const UvSetOfMaterial& uv_set) {
   GltfBuilder builder(path, model, limits, uv_set);
-  gltf::visit_nodes(path, model,
+  gltf::visit_nodes(path, model, origin,
                     [&](int index, const tinygltf::Node& node, const glm::dmat4& world_from_node) {
                       builder.add_node(index, node, world_from_node);
                     });
@@ -287,7 +287,7 @@ LoadedMesh gltf::read_meshes(const std::string& path, const tinygltf::Model& mod
 }
 
 LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits) {
-  return gltf::read_meshes(path, gltf::read_document(path), limits, [](int) { return 0; });
+  return gltf::read_meshes(path, gltf::read_document(path), limits, glm::dvec3(0.0), [](int) { return 0; });
 }
 
 }  // namespace mirrorbake

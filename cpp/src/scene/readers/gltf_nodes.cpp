@@ -73,7 +73,7 @@ std::vector<int> roots(const std::string& path, const tinygltf::Model& model) {
 
 }  // namespace
 
-void visit_nodes(const std::string& path, const tinygltf::Model& model,
+void visit_nodes(const std::string& path, const tinygltf::Model& model, glm::dvec3 origin,
                  const std::function<void(int, const tinygltf::Node&, const glm::dmat4&)>& visit) {
   struct Step {
     int node;
@@ -81,7 +81,8 @@ void visit_nodes(const std::string& path, const tinygltf::Model& model,
   };
   std::vector<Step> stack;
   const std::vector<int> first = roots(path, model);
-  for (auto it = first.rbegin(); it != first.rend(); ++it) stack.push_back({*it, glm::dmat4(1.0)});
+  const glm::dmat4 world_from_file = glm::translate(glm::dmat4(1.0), -origin);
+  for (auto it = first.rbegin(); it != first.rend(); ++it) stack.push_back({*it, world_from_file});
   std::vector<bool> is_visited(model.nodes.size(), false);
   while (!stack.empty()) {
     const Step step = stack.back();

@@ -51,7 +51,7 @@ class GltfScene {
     }
     if (!model_.animations.empty()) warnings_.add("animations are not supported");
     std::map<int, int> uv_sets;
-    LoadedMesh mesh = gltf::read_meshes(path_, model_, options_.meshes, [&](int material) {
+    LoadedMesh mesh = gltf::read_meshes(path_, model_, options_.meshes, options_.origin, [&](int material) {
       const auto it = uv_sets.find(material);
       return it != uv_sets.end() ? it->second : uv_sets[material] = materials_.uv_set(material);
     });
@@ -62,7 +62,7 @@ class GltfScene {
       if (!material_of.contains(group.material)) material_of[group.material] = materials_.add(group.material);
     }
     loaded_.scene.objects = split_into_objects(std::move(mesh), loaded_.scene.materials, material_of);
-    gltf::visit_nodes(path_, model_,
+    gltf::visit_nodes(path_, model_, options_.origin,
                       [&](int index, const tinygltf::Node& node, const glm::dmat4& world_from_node) {
                         add_node(index, node, world_from_node);
                       });

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "mirrorbake/scene/load.hpp"
@@ -12,6 +14,10 @@ void check_options(const SceneOptions& options) {
   }
   if (!(options.luminous_efficacy >= 1e-6F && options.luminous_efficacy <= 1e6F)) {
     throw InvalidArgument("luminous_efficacy", text_of(options.luminous_efficacy), "1e-6 to 1e6");
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(options.origin[axis]) <= 1e12) continue;
+    throw InvalidArgument("origin", text_of(glm::vec3(options.origin)), "finite coordinates up to 1e12");
   }
 }
 

@@ -36,7 +36,9 @@ struct ObjContent {
   std::uint64_t colors = 0;  ///< vertices that have one
 };
 
-LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjContent* content = nullptr);
+/// `origin` becomes the mesh's zero.
+LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjContent* content = nullptr,
+                    glm::dvec3 origin = glm::dvec3(0.0));
 LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits);
 
 /// Extension of a file name in lower case, with its dot.

@@ -23,7 +23,8 @@
 namespace mirrorbake {
 namespace {
 
-std::optional<float> finite_float(std::string_view token) {
+// A number that float can hold, with the digits that only double can.
+std::optional<double> finite_number(std::string_view token) {
   if (token.starts_with('+')) token.remove_prefix(1);
   double value = 0.0;
   const auto [stop, code] = std::from_chars(token.data(), token.data() + token.size(), value);
@@ -33,7 +34,7 @@ std::optional<float> finite_float(std::string_view token) {
       !(std::abs(value) <= std::numeric_limits<float>::max())) {
     return std::nullopt;
   }
-  return static_cast<float>(value);
+  return value;
 }
 
 // position, position/uv, position//normal or position/uv/normal, each an integer. What follows a slash may be
@@ -58,8 +59,8 @@ std::optional<ObjCorner> corner_from(std::string_view token) {
 // they are the objects.
 class ObjReader {
  public:
-  ObjReader(const std::string& path, const MeshLimits& limits, ObjContent& content)
-      : path_(path), builder_(path, limits), content_(content) {}
+  ObjReader(const std::string& path, const MeshLimits& limits, ObjContent& content, glm::dvec3 origin)
+      : path_(path), builder_(path, limits), content_(content), origin_(origin) {}
 
   LoadedMesh read(std::string_view text) {
     TextLines objects(text);
@@ -80,10 +81,10 @@ class ObjReader {
       read_position(rest);
     } else if (keyword == "vn") {
       read_numbers(rest, 3);
-      builder_.add_normal({numbers_[0], numbers_[1], numbers_[2]});
+      builder_.add_normal(glm::vec3(first_three()));
     } else if (keyword == "vt") {
       read_numbers(rest, 1);
-      builder_.add_uv({numbers_[0], numbers_.size() > 1 ? numbers_[1] : 0.0F});
+      builder_.add_uv(glm::vec2(numbers_[0], numbers_.size() > 1 ? numbers_[1] : 0.0));
     } else if (keyword == "f" || keyword == "fo") {
       read_face(rest);
     } else if (keyword == "usemtl") {
@@ -116,7 +117,7 @@ class ObjReader {
   void read_numbers(std::string_view rest, std::size_t needed) {
     numbers_.clear();
     for (std::string_view token = take_token(rest); !token.empty(); token = take_token(rest)) {
-      const std::optional<float> value = finite_float(token);
+      const std::optional<double> value = finite_number(token);
       if (!value) fail("'" + std::string(token.substr(0, 40)) + "', expected a finite float32");
       numbers_.push_back(*value);
     }
@@ -125,13 +126,15 @@ class ObjReader {
     }
   }
 
+  glm::dvec3 first_three() const { return {numbers_[0], numbers_[1], numbers_[2]}; }
+
   // x y z, with a weight w for curves or, in files of scanners and sculptors, a colour.
   void read_position(std::string_view rest) {
     read_numbers(rest, 3);
-    builder_.add_position({numbers_[0], numbers_[1], numbers_[2]});
+    builder_.add_position(glm::vec3(first_three() - origin_));
     if (numbers_.size() < 6) return;
     ++content_.colors;
-    const auto unit = [](float v) { return std::clamp(v, 0.0F, 1.0F); };
+    const auto unit = [](double v) { return std::clamp(static_cast<float>(v), 0.0F, 1.0F); };
     builder_.set_color({unit(numbers_[3]), unit(numbers_[4]), unit(numbers_[5])});
   }
 
@@ -160,9 +163,10 @@ class ObjReader {
   const std::string& path_;
   ObjBuilder builder_;
   ObjContent& content_;
+  glm::dvec3 origin_;
   std::size_t line_number_ = 0;
   bool names_objects_ = false;
-  std::vector<float> numbers_;
+  std::vector<double> numbers_;
   std::vector<ObjCorner> corners_;
 };
 
@@ -193,9 +197,11 @@ std::vector<std::string> library_files(const std::string& path, std::string name
   return files;
 }
 
-LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjContent* content) {
+LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjContent* content,
+                    glm::dvec3 origin) {
   ObjContent ignored;
-  LoadedMesh loaded = ObjReader(path, limits, content != nullptr ? *content : ignored).read(read_file(path));
+  LoadedMesh loaded =
+      ObjReader(path, limits, content != nullptr ? *content : ignored, origin).read(read_file(path));
   check_positions(path, loaded.mesh.positions);
   return loaded;
 }

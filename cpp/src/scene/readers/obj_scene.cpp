@@ -27,7 +27,7 @@ class ObjScene {
 
   LoadedScene read() {
     ObjContent used;
-    LoadedMesh mesh = read_obj(path_, options_.meshes, &used);
+    LoadedMesh mesh = read_obj(path_, options_.meshes, &used, options_.origin);
     drop_degenerate(path_, mesh);
     warnings_.add("lines are not supported", used.lines);
     warnings_.add("points are not supported", used.points);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cctype>
 #include <cstddef>
@@ -34,8 +33,9 @@ class ByteWriter {
  public:
   template <typename T>
   void put(T value) {
-    const auto raw = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
-    bytes.insert(bytes.end(), raw.begin(), raw.end());
+    const std::size_t end = bytes.size();
+    bytes.resize(end + sizeof value);
+    overwrite(end, value);
   }
   void put_text(std::string_view text) {
     for (const char c : text) bytes.push_back(static_cast<std::byte>(c));

@@ -44,8 +44,8 @@ void bind_texture(nb::module_& m) {
 }
 
 void bind_surface_material(nb::module_& m) {
-  nb::class_<Fresnel> fresnel(m, "Fresnel", "Reflectance per colour channel as a function of the angle.");
-  fresnel
+  nb::class_<Fresnel> reflectance(m, "Fresnel", "Reflectance per colour channel as a function of the angle.");
+  reflectance
       .def(
           "__init__",
           [](Fresnel* self, FresnelModel model, glm::vec3 r0, glm::vec3 eta, glm::vec3 k) {
@@ -58,7 +58,7 @@ void bind_surface_material(nb::module_& m) {
               "constant: reflectance; schlick: reflectance at normal incidence; in [0, 1]")
       .def_rw("eta", &Fresnel::eta, "dielectric, conductor: real part of the relative index, above 0")
       .def_rw("k", &Fresnel::k, "conductor: extinction coefficient, at least 0");
-  record(fresnel, {"model", "r0", "eta", "k"});
+  record(reflectance, {"model", "r0", "eta", "k"});
 
   nb::class_<Material> material(m, "Material", "What a surface does with light.");
   material

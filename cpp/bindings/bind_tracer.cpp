@@ -93,8 +93,7 @@ void bind_tracer(nb::module_& m) {
               "Numbers of objects, ITSELF for the reflector; empty: any, and lights.")
       .def_rw("nearer_than", &ShellRule::nearer_than, "Along the reflected ray, metres, more than 0.")
       .def_prop_ro_static(
-          "ITSELF", [](nb::handle) { return ShellRule::kItself; },
-          "The reflector, as an entry of `objects`.")
+          "ITSELF", [](nb::handle) { return ShellRule::kItself; }, "The reflector, as an entry of `objects`.")
       .def(
           "__eq__", [](const ShellRule& a, const ShellRule& b) { return a == b; }, nb::is_operator(),
           nb::sig("def __eq__(self, other: object, /) -> bool"));

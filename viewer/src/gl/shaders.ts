@@ -307,11 +307,12 @@ vec3 bend(vec3 view, vec3 n, vec3 g) {
   return size > 0.0 ? middle / size : g;
 }
 
-// Tracer's mapped_normal (glTF 2.0 §3.9.3): v of the coordinates counts downwards, that of the texels upwards. \`front\` is the
-// geometric normal of the triangle's front.
-vec3 mapped(vec3 n, vec3 front, vec3 px, vec3 py, vec2 ux, vec2 uy) {
+// Tracer's front_normal with the texture of mapped_normal (glTF 2.0 §3.9.3): v of the coordinates counts downwards, that of the
+// texels upwards. \`front\` is the geometric normal of the triangle's front.
+vec3 frontNormal(vec3 interpolated, vec3 front, vec2 uv, vec3 px, vec3 py, vec2 ux, vec2 uy) {
+  vec3 n = uFlat || dot(interpolated, front) <= 0.0 ? front : normalize(interpolated);
   float determinant = ux.x * uy.y - uy.x * ux.y;
-  if (determinant == 0.0) return n;
+  if (!uTextured.z || determinant == 0.0) return n;
   float turn = sign(determinant);
   vec3 along = turn * (px * uy.y - py * ux.y);
   vec3 t = along - dot(along, n) * n;
@@ -320,7 +321,8 @@ vec3 mapped(vec3 n, vec3 front, vec3 px, vec3 py, vec2 ux, vec2 uy) {
   t /= size;
   vec3 b = cross(n, t);
   if (dot(b, turn * (px * uy.x - py * ux.x)) < 0.0) b = -b;
-  vec3 texel = 2.0 * texture(uNormalTexture, uNormalFromUv * vec3(vUv, 1.0)).rgb - 1.0;
+  vec2 dx = uNormalFromUv * vec3(ux, 0.0), dy = uNormalFromUv * vec3(uy, 0.0);
+  vec3 texel = 2.0 * textureGrad(uNormalTexture, uNormalFromUv * vec3(uv, 1.0), dx, dy).rgb - 1.0;
   vec3 bent = uNormalScale * (texel.x * t + texel.y * b) + texel.z * n;
   return length(bent) > 1e-6 && dot(bent, front) > 0.0 ? normalize(bent) : n;
 }
@@ -369,15 +371,15 @@ void main() {
   vec3 view = toEye / range;
   vec3 px = dFdx(vPosition), py = dFdy(vPosition);
   vec3 nx = dFdx(vNormal), ny = dFdy(vNormal);
+  vec2 ux = dFdx(vUv), uy = dFdy(vUv);
   vec3 g = cross(px, py);
   g = length(g) > 0.0 ? normalize(g) : view;
   if (dot(g, view) < 0.0) g = -g;
   float side = gl_FrontFacing ? 1.0 : -1.0;
   float normalLength = max(length(vNormal), 1e-6);
-  vec3 n = side * vNormal / normalLength;
-  if (uFlat || dot(n, g) <= 0.0) n = g;
-  if (uTextured.z) n = side * mapped(side * n, side * g, px, py, dFdx(vUv), dFdy(vUv));
-  n = bend(view, n, g);
+  vec3 front = side * g;
+  vec3 outside = frontNormal(vNormal, front, vUv, px, py, ux, uy);
+  vec3 n = bend(view, side * outside, g);
   vec3 d = -view;
   vec3 r = normalize(2.0 * dot(n, view) * n - view);
 
@@ -396,9 +398,13 @@ void main() {
     vec3 p = travel - (dot(travel, g) / cosine) * d;
     p -= dot(p, g) * g;
     vec3 dNormal = vec3(0.0);
-    if (!uFlat && determinant > 0.0) {
+    if ((!uFlat || uTextured.z) && determinant > 0.0) {
       float p1 = dot(p, px), p2 = dot(p, py);
-      vec3 dn = (nx * (p1 * e22 - p2 * e12) + ny * (p2 * e11 - p1 * e12)) / determinant / normalLength;
+      float a = (p1 * e22 - p2 * e12) / determinant, b = (p2 * e11 - p1 * e12) / determinant;
+      vec3 moved = vNormal + a * nx + b * ny;
+      vec3 dn = uTextured.z
+        ? frontNormal(moved, front, vUv + a * ux + b * uy, px, py, ux, uy) - outside
+        : (a * nx + b * ny) / normalLength;
       dNormal = side * (dn - dot(dn, n) * n);
     }
     pd[i] = uFootprint * p;

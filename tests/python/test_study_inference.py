@@ -18,7 +18,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "teapot-room.toml"
 def results() -> dict[str, inference.Result]:
     overrides = [parse_override("views.size=[48,48]"), parse_override("reflector.subdivisions=6")]
     stage = prepare_stage(load_config(EXAMPLE, overrides))
-    lab = inference.Lab(stage, (22.0, 20.0), samples=8, reference_samples=32, map_size=32)
+    lab = inference.Lab(stage, (22.0, 20.0), samples=32, reference_samples=64, map_size=32)
     options = _core.DisplayFitOptions(solve=_core.SolveOptions(max_iterations=60))
     found = inference.study(lab, ["Web"], options)
     return {result.fit: result for result in found}
@@ -26,7 +26,7 @@ def results() -> dict[str, inference.Result]:
 
 def test_maps_of_a_view_beat_the_static_set_on_it(results: dict[str, inference.Result]) -> None:
     assert set(results) == set(inference.FITS)
-    assert results["one view"].decibels["on"] > results["static set"].decibels["on"] + 1.0
+    assert results["one view"].decibels["on"] > results["static set"].decibels["on"] + 2.0
 
 
 def test_a_static_set_does_not_know_where_it_is_seen_from(results: dict[str, inference.Result]) -> None:

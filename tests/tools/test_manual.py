@@ -14,7 +14,17 @@ COMMANDS = [
     *(f"mb-trace {command}" for command in ("beauty", "layers", "capture")),
     *(
         f"mb-envmap {command}"
-        for command in ("info", "convert", "mips", "border", "sample", "prefilter", "compare")
+        for command in (
+            "info",
+            "convert",
+            "rotate",
+            "preview",
+            "mips",
+            "border",
+            "sample",
+            "prefilter",
+            "compare",
+        )
     ),
     *(f"mb-fresnel {command}" for command in ("table", "plot", "metal", "report")),
     *(

@@ -271,7 +271,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str
 
 def test_the_three_js_example_draws_what_the_library_draws(served: tuple[Path, str], tmp_path: Path) -> None:
     folder, address = served
-    # The example reads maps once for every pixel, as the run time of maps that are fitted layer by layer does.
+    # The example reads maps once for every pixel, as the run time of maps fitted layer by layer does.
     bake(parse_config({**SMALL, "infer": {"fit": "layers"}}, "small"), tmp_path / "pem")
     pem = open_pem(tmp_path / "pem")
     built, store = pem.stage.built, pem.store

@@ -88,9 +88,8 @@ class SampleBaker:
     ) -> BakedSample:
         header, tracer = self._header, self._tracer
         own = tracer.at(header.space.sample(index))
-        nodes, views = [index], [FitView(own)]
         if header.is_static_set:
-            views = static_views(tracer, stage)
+            nodes, views = [index], static_views(tracer, stage)
         else:
             nodes, views = self._with_neighbours(index)
         prior: FloatArray | None = None

@@ -15,6 +15,9 @@
 #include "mirrorbake/envmap/sampling.hpp"
 #include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/image/texture_file.hpp"
+#include "mirrorbake/prefilter/convolve.hpp"
+#include "mirrorbake/prefilter/harmonics.hpp"
+#include "mirrorbake/prefilter/lobe.hpp"
 #include "mirrorbake/scene/load.hpp"
 #include "mirrorbake/scene/scene.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
@@ -106,13 +109,18 @@ MIRRORBAKE_NAME_ENUM(FaceLayout, "faces", "automatic", "strip", "column", "grid"
                      "files");
 MIRRORBAKE_NAME_ENUM(FileContent, "content", "mesh", "scene");
 MIRRORBAKE_NAME_ENUM(FresnelModel, "model", "constant", "schlick", "dielectric", "conductor");
+MIRRORBAKE_NAME_ENUM(HarmonicWindow, "window", "none", "hanning", "sloan");
 MIRRORBAKE_NAME_ENUM(Illuminant, "illuminant", "D65", "E");
 MIRRORBAKE_NAME_ENUM(IndirectLight, "indirect", "none", "cached", "path");
 MIRRORBAKE_NAME_ENUM(LayerModel, "layers", "additive", "coated");
+MIRRORBAKE_NAME_ENUM(LobeKind, "kind", "lambert", "phong", "ggx", "table");
+MIRRORBAKE_NAME_ENUM(LobeScale, "scale", "mean", "sum");
 MIRRORBAKE_NAME_ENUM(LookupFilter, "filter", "nearest", "bilinear", "trilinear", "anisotropic");
 MIRRORBAKE_NAME_ENUM(MipFilter, "filter", "box", "solid_angle", "seamless");
+MIRRORBAKE_NAME_ENUM(NegativeLight, "negative", "clamp", "keep");
 MIRRORBAKE_NAME_ENUM(PixelFormat, "format", "automatic", "half", "float32", "uint8", "uint16");
 MIRRORBAKE_NAME_ENUM(ResampleFilter, "filter", "automatic", "area", "bilinear", "nearest");
+MIRRORBAKE_NAME_ENUM(RoughnessScale, "roughness", "squared", "linear");
 MIRRORBAKE_NAME_ENUM(SampleFilter, "filter", "nearest", "bilinear", "trilinear", "ewa");
 MIRRORBAKE_NAME_ENUM(SpecularLobe, "lobe", "mirror", "ggx", "phong");
 MIRRORBAKE_NAME_ENUM(TextureWrap, "wrap", "repeat", "clamp", "mirror");

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bind.hpp"
-#include "mirrorbake/core/error.hpp"
+#include "bind_enums.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 #include "mirrorbake/prefilter/convolve.hpp"
 #include "mirrorbake/prefilter/harmonics.hpp"
@@ -27,37 +27,15 @@ struct OwningConvolver {
       : values(std::move(array)), convolver(EnvMapView{layout, {values.data(), values.size()}}) {}
 };
 
-Lobe lobe_named(const std::string& kind, double parameter, std::vector<double> table) {
-  Lobe lobe;
-  if (kind == "lambert") {
-    lobe.kind = LobeKind::lambert;
-  } else if (kind == "phong") {
-    lobe.kind = LobeKind::phong;
-    lobe.exponent = parameter;
-  } else if (kind == "ggx") {
-    lobe.kind = LobeKind::ggx;
-    lobe.alpha = parameter;
-  } else if (kind == "table") {
-    lobe.kind = LobeKind::table;
-    lobe.table_angle = parameter;
-    lobe.table = std::move(table);
-  } else {
-    throw InvalidArgument("kind", kind, "lambert, phong, ggx or table");
-  }
+// `parameter` is the number that the kind of lobe has.
+Lobe lobe_of(LobeKind kind, double parameter, std::vector<double> table) {
+  Lobe lobe{kind};
+  if (kind == LobeKind::phong) lobe.exponent = parameter;
+  if (kind == LobeKind::ggx) lobe.alpha = parameter;
+  if (kind == LobeKind::table) lobe.table_angle = parameter;
+  lobe.table = std::move(table);
   validate(lobe);
   return lobe;
-}
-
-LobeScale scale_named(const std::string& name) {
-  if (name == "mean") return LobeScale::mean;
-  if (name == "sum") return LobeScale::sum;
-  throw InvalidArgument("scale", name, "mean or sum");
-}
-
-RoughnessScale roughness_named(const std::string& name) {
-  if (name == "squared") return RoughnessScale::squared;
-  if (name == "linear") return RoughnessScale::linear;
-  throw InvalidArgument("roughness", name, "squared or linear");
 }
 
 using DoubleMatrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
@@ -90,8 +68,8 @@ void bind_prefilter(nb::module_& m) {
   nb::class_<Lobe>(m, "Lobe", "A radially symmetric lobe of weights.")
       .def(
           "__init__",
-          [](Lobe* self, const std::string& kind, double parameter, std::vector<double> table) {
-            new (self) Lobe(lobe_named(kind, parameter, std::move(table)));
+          [](Lobe* self, LobeKind kind, double parameter, std::vector<double> table) {
+            new (self) Lobe(lobe_of(kind, parameter, std::move(table)));
           },
           nb::arg("kind"), nb::arg("parameter") = 1.0, nb::arg("table") = std::vector<double>{},
           "lambert; phong (exponent); ggx (alpha); table (largest angle in degrees, weights at equal steps).")
@@ -110,31 +88,30 @@ void bind_prefilter(nb::module_& m) {
       .def(
           "apply",
           [](OwningConvolver& self, const Lobe& lobe, const std::string& projection, int width, int height,
-             const std::string& scale) {
+             LobeScale scale) {
             const PrefilterTarget target{parse_projection(projection), width, height};
-            const LobeScale lobe_scale = scale_named(scale);
             EnvMap map;
             {
               nb::gil_scoped_release released;
-              map = self.convolver.apply(lobe, target, lobe_scale);
+              map = self.convolver.apply(lobe, target, scale);
             }
             return nb::make_tuple(map.layout, block(std::move(map.values)));
           },
           nb::arg("lobe"), nb::arg("projection"), nb::arg("width"), nb::arg("height"), nb::arg("scale"),
-          nb::sig("def apply(self, lobe: Lobe, projection: str, width: int, height: int, scale: str) -> "
+          nb::sig("def apply(self, lobe: Lobe, projection: str, width: int, height: int, "
+                  "scale: typing.Literal['mean', 'sum']) -> "
                   "tuple[EnvMapLayout, NDArray[numpy.float32]]"),
           "Layout and values of the map, by the direction of the lobe's axis.")
       .def(
           "sample",
-          [](OwningConvolver& self, const Lobe& lobe, PointArray directions, const std::string& scale,
+          [](OwningConvolver& self, const Lobe& lobe, PointArray directions, LobeScale scale,
              std::size_t channels) {
             std::vector<float> values(directions.shape(0) * channels);
-            const LobeScale lobe_scale = scale_named(scale);
             {
               nb::gil_scoped_release released;
               self.convolver.apply(
-                  lobe, {reinterpret_cast<const glm::vec3*>(directions.data()), directions.shape(0)},
-                  lobe_scale, values);
+                  lobe, {reinterpret_cast<const glm::vec3*>(directions.data()), directions.shape(0)}, scale,
+                  values);
             }
             return to_numpy(std::move(values), {directions.shape(0), channels});
           },
@@ -142,9 +119,9 @@ void bind_prefilter(nb::module_& m) {
           "Values (n, channels) for lobes about unit directions (n, 3).");
   m.def(
       "ggx_chain",
-      [](const EnvMapLayout& layout, FloatArray values, int size, int levels, const std::string& roughness,
+      [](const EnvMapLayout& layout, FloatArray values, int size, int levels, RoughnessScale roughness,
          const std::function<void(int, int)>& progress) {
-        ChainOptions options{size, levels, roughness_named(roughness)};
+        ChainOptions options{size, levels, roughness};
         if (progress) {
           options.progress = [&](int level, int count) {
             nb::gil_scoped_acquire held;
@@ -161,15 +138,12 @@ void bind_prefilter(nb::module_& m) {
       nb::arg("layout"), nb::arg("values"), nb::arg("size"), nb::arg("levels"), nb::arg("roughness"),
       nb::arg("progress").none() = nb::none(),
       nb::sig("def ggx_chain(layout: EnvMapLayout, values: NDArray[numpy.float32], size: int, levels: int, "
-              "roughness: str, progress: collections.abc.Callable[[int, int], None] | None = None) -> "
+              "roughness: typing.Literal['squared', 'linear'], progress: collections.abc.Callable[[int, "
+              "int], None] | None = None) -> "
               "tuple[EnvMapLayout, NDArray[numpy.float32]]"),
       "A cube whose levels are prefiltered with GGX of rising alpha.");
-  m.def(
-      "chain_alpha",
-      [](int level, int levels, const std::string& roughness) {
-        return chain_alpha(level, levels, roughness_named(roughness));
-      },
-      nb::arg("level"), nb::arg("levels"), nb::arg("roughness"), "Alpha of a level of a chain.");
+  m.def("chain_alpha", &chain_alpha, nb::arg("level"), nb::arg("levels"), nb::arg("roughness"),
+        "Alpha of a level of a chain.");
 
   m.def(
       "project_harmonics",
@@ -193,22 +167,24 @@ void bind_prefilter(nb::module_& m) {
       nb::arg("radiance"), "Coefficients of irradiance from those of radiance.");
   m.def(
       "window_harmonics",
-      [](DoubleMatrix coefficients, const std::string& window) {
-        Harmonics harmonics = windowed(harmonics_of(coefficients), parse_harmonic_window(window));
+      [](DoubleMatrix coefficients, HarmonicWindow window) {
+        Harmonics harmonics = windowed(harmonics_of(coefficients), window);
         return rows_of(std::move(harmonics.coefficients), harmonics.channels);
       },
       nb::arg("coefficients"), nb::arg("window"), "Coefficients damped against ringing.");
   m.def(
       "evaluate_harmonics",
-      [](DoubleMatrix coefficients, const std::string& projection, int width, int height, bool clamp) {
-        EnvMap map =
-            evaluate_harmonics(harmonics_of(coefficients), {parse_projection(projection), width, height},
-                               clamp ? NegativeLight::clamp : NegativeLight::keep);
+      [](DoubleMatrix coefficients, const std::string& projection, int width, int height,
+         NegativeLight negative) {
+        EnvMap map = evaluate_harmonics(harmonics_of(coefficients),
+                                        {parse_projection(projection), width, height}, negative);
         return nb::make_tuple(map.layout, block(std::move(map.values)));
       },
-      nb::arg("coefficients"), nb::arg("projection"), nb::arg("width"), nb::arg("height"), nb::arg("clamp"),
+      nb::arg("coefficients"), nb::arg("projection"), nb::arg("width"), nb::arg("height"),
+      nb::arg("negative"),
       nb::sig("def evaluate_harmonics(coefficients: NDArray[numpy.float64], projection: str, width: int, "
-              "height: int, clamp: bool) -> tuple[EnvMapLayout, NDArray[numpy.float32]]"),
+              "height: int, negative: typing.Literal['clamp', 'keep']) -> tuple[EnvMapLayout, "
+              "NDArray[numpy.float32]]"),
       "Layout and values of the map of the sums.");
   m.def(
       "harmonic_constants",
@@ -228,8 +204,8 @@ void bind_prefilter(nb::module_& m) {
       "Scale and bias of the reflectance at normal incidence.");
   m.def(
       "split_sum_table",
-      [](int size, const std::string& roughness) {
-        std::vector<float> table = split_sum_table(size, roughness_named(roughness));
+      [](int size, RoughnessScale roughness) {
+        std::vector<float> table = split_sum_table(size, roughness);
         const std::size_t n = static_cast<std::size_t>(size);
         return to_numpy(std::move(table), {n, n, 3});
       },

@@ -1848,7 +1848,7 @@ def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArra
 class Lobe:
     """A radially symmetric lobe of weights."""
 
-    def __init__(self, kind: str, parameter: float = 1.0, table: Sequence[float] = []) -> None:
+    def __init__(self, kind: Literal['lambert', 'phong', 'ggx', 'table'], parameter: float = 1.0, table: Sequence[float] = []) -> None:
         """
         lambert; phong (exponent); ggx (alpha); table (largest angle in degrees, weights at equal steps).
         """
@@ -1877,16 +1877,16 @@ class Convolver:
 
     def __init__(self, layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> None: ...
 
-    def apply(self, lobe: Lobe, projection: str, width: int, height: int, scale: str) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
+    def apply(self, lobe: Lobe, projection: str, width: int, height: int, scale: Literal['mean', 'sum']) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
         """Layout and values of the map, by the direction of the lobe's axis."""
 
-    def sample(self, lobe: Lobe, directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], scale: str, channels: int) -> NDArray[numpy.float32]:
+    def sample(self, lobe: Lobe, directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], scale: Literal['mean', 'sum'], channels: int) -> NDArray[numpy.float32]:
         """Values (n, channels) for lobes about unit directions (n, 3)."""
 
-def ggx_chain(layout: EnvMapLayout, values: NDArray[numpy.float32], size: int, levels: int, roughness: str, progress: Callable[[int, int], None] | None = None) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
+def ggx_chain(layout: EnvMapLayout, values: NDArray[numpy.float32], size: int, levels: int, roughness: Literal['squared', 'linear'], progress: Callable[[int, int], None] | None = None) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
     """A cube whose levels are prefiltered with GGX of rising alpha."""
 
-def chain_alpha(level: int, levels: int, roughness: str) -> float:
+def chain_alpha(level: int, levels: int, roughness: Literal['squared', 'linear']) -> float:
     """Alpha of a level of a chain."""
 
 def project_harmonics(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], order: int) -> NDArray[numpy.float64]:
@@ -1898,10 +1898,10 @@ def lambert_factor(band: int) -> float:
 def lambert_harmonics(radiance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float64]:
     """Coefficients of irradiance from those of radiance."""
 
-def window_harmonics(coefficients: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], window: str) -> NDArray[numpy.float64]:
+def window_harmonics(coefficients: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], window: Literal['none', 'hanning', 'sloan']) -> NDArray[numpy.float64]:
     """Coefficients damped against ringing."""
 
-def evaluate_harmonics(coefficients: NDArray[numpy.float64], projection: str, width: int, height: int, clamp: bool) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
+def evaluate_harmonics(coefficients: NDArray[numpy.float64], projection: str, width: int, height: int, negative: Literal['clamp', 'keep']) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
     """Layout and values of the map of the sums."""
 
 def harmonic_constants(radiance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float64]:
@@ -1912,7 +1912,7 @@ def harmonic_constants(radiance: Annotated[NDArray[numpy.float64], dict(shape=(N
 def split_sum(cosine: float, alpha: float) -> tuple[float, float]:
     """Scale and bias of the reflectance at normal incidence."""
 
-def split_sum_table(size: int, roughness: str) -> NDArray[numpy.float32]:
+def split_sum_table(size: int, roughness: Literal['squared', 'linear']) -> NDArray[numpy.float32]:
     """Scale, bias and their sum (roughness, n.v, 3)."""
 
 @overload

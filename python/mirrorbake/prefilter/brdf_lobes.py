@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from mirrorbake.envmap import EnvMap
+    from mirrorbake.literals import LobeScale
     from mirrorbake.prefilter.reflection_space import Brdf
 
 _RINGS, _AROUND, _STEPS = 400, 96, 256
@@ -140,7 +141,7 @@ def several_lobes(
     lobes: Sequence[tuple[float, _core.Lobe]],
     directions: ArrayLike,
     *,
-    scale: str = "mean",
+    scale: LobeScale = "mean",
 ) -> NDArray[np.float64]:
     """Σ k · (the light that a lobe gathers) about directions (..., 3), for pairs of k and a lobe."""
     if not lobes:

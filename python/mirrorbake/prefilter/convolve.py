@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from mirrorbake.literals import LobeScale, RoughnessScale
+
 
 def lambert() -> _core.Lobe:
     """Cosine lobe: max(0, cos γ)."""
@@ -79,7 +81,7 @@ class Prefilter:
         size: int | tuple[int, int],
         projection: str = "cube",
         *,
-        scale: str = "mean",
+        scale: LobeScale = "mean",
     ) -> EnvMap:
         """Return the map of the lobe by the direction of its axis.
 
@@ -104,7 +106,9 @@ class Prefilter:
         layout, values = self._convolver.apply(lobe, projection, width, height, scale)
         return EnvMap(layout, values, list(self._channels))
 
-    def sample(self, lobe: _core.Lobe, directions: ArrayLike, *, scale: str = "mean") -> NDArray[np.float32]:
+    def sample(
+        self, lobe: _core.Lobe, directions: ArrayLike, *, scale: LobeScale = "mean"
+    ) -> NDArray[np.float32]:
         """Values (..., C) of lobes about directions (..., 3); InvalidArgument for NaN and zero ones."""
         array = vectors("directions", directions, 3)
         values = self._convolver.sample(lobe, array.reshape(-1, 3), scale, len(self._channels))
@@ -117,7 +121,7 @@ def prefilter(
     size: int | tuple[int, int],
     projection: str = "cube",
     *,
-    scale: str = "mean",
+    scale: LobeScale = "mean",
 ) -> EnvMap:
     """Convolve the finest level of a map with one lobe; see `Prefilter.apply`."""
     return Prefilter(envmap).apply(lobe, size, projection, scale=scale)
@@ -133,7 +137,7 @@ def ggx_chain(
     size: int = 256,
     levels: int = 0,
     *,
-    roughness: str = "squared",
+    roughness: RoughnessScale = "squared",
     progress: Callable[[int, int], None] | None = None,
 ) -> EnvMap:
     """Return a cube whose levels are prefiltered with GGX, from the map itself to α = 1.
@@ -161,7 +165,7 @@ def ggx_chain(
     return EnvMap(layout, values, list(envmap.channels))
 
 
-def chain_alphas(levels: int, *, roughness: str = "squared") -> NDArray[np.float64]:
+def chain_alphas(levels: int, *, roughness: RoughnessScale = "squared") -> NDArray[np.float64]:
     """α of every level of a `ggx_chain`: 0 first, then at least 0.01.
 
     >>> chain_alphas(3).tolist()
@@ -183,7 +187,7 @@ def split_sum(cosine: float, alpha: float) -> tuple[float, float]:
     return _core.split_sum(cosine, alpha)
 
 
-def split_sum_table(size: int = 128, *, roughness: str = "squared") -> NDArray[np.float32]:
+def split_sum_table(size: int = 128, *, roughness: RoughnessScale = "squared") -> NDArray[np.float32]:
     """Scale, bias and their sum E, (size, size, 3): rows by roughness, columns by n·v, at (i + ½)/size.
 
     A renderer reflects ``chain(r, roughness) * (r0 * scale + bias)``, times ``1 + r0 * (1 / E - 1)`` for

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from mirrorbake.literals import HarmonicWindow, NegativeLight
+
 
 _LARGEST_JSON = 1 << 20  # bytes: 81 rows take a hundredth of it
 
@@ -77,7 +79,7 @@ class Harmonics:
         """Of irradiance, if these are of radiance: bands times π, 2π/3, π/4, 0 and so on."""
         return Harmonics(_core.lambert_harmonics(self.coefficients))
 
-    def windowed(self, window: str) -> Harmonics:
+    def windowed(self, window: HarmonicWindow) -> Harmonics:
         """Damped against ringing, by ``hanning`` or ``sloan``; ``none`` gives the same.
 
         ``sloan`` divides band l by 1 + λ l² (l + 1)² with the least λ that leaves nothing below 0.
@@ -85,15 +87,11 @@ class Harmonics:
         return Harmonics(_core.window_harmonics(self.coefficients, window))
 
     def evaluate(
-        self, size: int | tuple[int, int], projection: str = "cube", *, negative: str = "clamp"
+        self, size: int | tuple[int, int], projection: str = "cube", *, negative: NegativeLight = "clamp"
     ) -> EnvMap:
         """Return the map of the sums. ``negative``: ``clamp`` sums below 0 to 0, or ``keep`` them."""
-        if negative not in {"clamp", "keep"}:
-            raise _core.InvalidArgument(f"negative is {negative!r}, expected clamp or keep")
         height, width = height_and_width(projection, size)
-        layout, values = _core.evaluate_harmonics(
-            self.coefficients, projection, width, height, negative == "clamp"
-        )
+        layout, values = _core.evaluate_harmonics(self.coefficients, projection, width, height, negative)
         return EnvMap.from_array(
             EnvMap(layout, values, [str(c) for c in range(layout.channels)]).level(), projection
         )

@@ -13,6 +13,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/compare.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
+#include "mirrorbake/envmap/dds.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
 #include "mirrorbake/envmap/footprint.hpp"
@@ -291,6 +292,16 @@ void bind_envmap(nb::module_& m) {
       nb::arg("path"), nb::arg("layout"), nb::arg("values"), nb::arg("channels"),
       nb::arg("faces") = FaceLayout::automatic, nb::arg("format") = PixelFormat::automatic,
       "Write the finest level as an image, or all levels as KTX2 or DDS.");
+
+  m.def(
+      "save_dds_bc6h",
+      [](const PathText& path, const EnvMapLayout& layout, const nb::bytes& blocks) {
+        const std::span<const std::byte> bytes(static_cast<const std::byte*>(blocks.data()), blocks.size());
+        nb::gil_scoped_release released;
+        save_dds_bc6h(path.text, layout, bytes);
+      },
+      nb::arg("path"), nb::arg("layout"), nb::arg("blocks"),
+      "Write encoded blocks of a cube: all levels of a face, one face after the other.");
 
   nb::class_<Comparison> comparison(m, "Comparison", "How two maps differ, texels weighted by solid angle.");
   comparison.def_ro("max_error", &Comparison::max_error, "Largest difference.")

@@ -1485,6 +1485,11 @@ def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '')
 def save_envmap(path: str | os.PathLike[str], layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], channels: Sequence[str], faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic', format: Literal['automatic', 'half', 'float32', 'uint8', 'uint16'] = 'automatic') -> SaveReport:
     """Write the finest level as an image, or all levels as KTX2 or DDS."""
 
+def save_dds_bc6h(path: str | os.PathLike[str], layout: EnvMapLayout, blocks: bytes) -> None:
+    """
+    Write encoded blocks of a cube: all levels of a face, one face after the other.
+    """
+
 class Comparison:
     """How two maps differ, texels weighted by solid angle."""
 

@@ -159,7 +159,8 @@ class EnvMap:
         faces
             ``automatic``, ``strip``, ``column``, ``grid``, ``cross``, ``vertical_cross`` or ``files``.
         format
-            ``automatic``, ``half``, ``float32``, ``uint8`` or ``uint16``.
+            ``automatic``, ``half``, ``float32``, ``uint8`` or ``uint16``; `mirrorbake.bc6h.save_bc6h` writes
+            BC6H.
 
         Raises
         ------

@@ -4,9 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
+#include <span>
 #include <vector>
 
+#include "bc6h.hpp"
 #include "cube_file.hpp"
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
 #include "mirrorbake/image/half.hpp"
@@ -25,8 +29,9 @@ constexpr std::uint32_t kDx10 = four("DX10");
 constexpr std::uint64_t kHeaderBytes = 128;  // with the magic
 constexpr std::uint64_t kDx10Bytes = 20;
 
-// DDSD_CAPS | HEIGHT | WIDTH | PITCH | PIXELFORMAT, and MIPMAPCOUNT.
-constexpr std::uint32_t kFlags = 0x1 | 0x2 | 0x4 | 0x8 | 0x1000;
+// DDSD_CAPS | HEIGHT | WIDTH | PIXELFORMAT, PITCH or LINEARSIZE, and MIPMAPCOUNT.
+constexpr std::uint32_t kFlags = 0x1 | 0x2 | 0x4 | 0x1000;
+constexpr std::uint32_t kFlagPitch = 0x8, kFlagLinearSize = 0x80000;
 constexpr std::uint32_t kFlagLevels = 0x20000;
 constexpr std::uint32_t kFourCc = 0x4;                               // DDPF_FOURCC
 constexpr std::uint32_t kCaps = 0x1000 | 0x8;                        // TEXTURE | COMPLEX
@@ -35,14 +40,17 @@ constexpr std::uint32_t kCube = 0x200;                               // DDSCAPS2
 constexpr std::uint32_t kAllFaces = 0xfc00;                          // all six DDSCAPS2_CUBEMAP_…
 constexpr std::uint32_t kTexture2d = 3, kMiscCube = 4, kOpaque = 3;  // of the DX10 header
 
+constexpr std::uint32_t kBc6hUnsigned = 95;  // DXGI_FORMAT_BC6H_UF16
+constexpr std::uint32_t kBc6hSigned = 96;
+
 // DXGI_FORMAT_R16_FLOAT and so on; `code` is the D3DFMT number that older writers put into the FourCC.
 struct Format {
   std::uint32_t dxgi;
   std::uint32_t code;
   int channels;
-  std::size_t bytes;  // of a channel
+  std::size_t bytes;  // of a channel; 0: blocks of BC6H
 };
-constexpr std::array<Format, 7> kFormats = {{
+constexpr std::array<Format, 9> kFormats = {{
     {54, 111, 1, 2},
     {34, 112, 2, 2},
     {10, 113, 4, 2},
@@ -50,6 +58,8 @@ constexpr std::array<Format, 7> kFormats = {{
     {16, 115, 2, 4},
     {6, 0, 3, 4},
     {2, 116, 4, 4},
+    {kBc6hUnsigned, 0, 3, 0},
+    {kBc6hSigned, 0, 3, 0},
 }};
 
 // Calls visit(level, face) in the order of the file: all levels of a face, one face after the other.
@@ -62,6 +72,58 @@ void for_each_image(const EnvMapLayout& layout, Visit&& visit) {
 
 std::size_t values_of_face(const EnvMapLayout& layout, int level) {
   return (layout.level_offset(level + 1) - layout.level_offset(level)) / 6;
+}
+
+std::size_t blocks_across(const EnvMapLayout& layout, int level) {
+  return (static_cast<std::size_t>(layout.level_width(level)) + 3) / 4;
+}
+
+std::uint64_t bc6h_bytes(const EnvMapLayout& layout) {
+  std::uint64_t bytes = 0;
+  for_each_image(layout, [&](int level, int) {
+    const std::uint64_t across = blocks_across(layout, level);
+    bytes += across * across * kBc6hBytes;
+  });
+  return bytes;
+}
+
+// Texels of a face; those of the last blocks that lie beyond it are left out.
+void read_bc6h(FileBytes& in, std::uint64_t& place, std::size_t side, bool is_signed, float* values) {
+  const std::size_t across = (side + 3) / 4;
+  std::vector<std::uint8_t> line(across * kBc6hBytes);
+  std::array<std::uint16_t, 48> halves{};
+  for (std::size_t top = 0; top < side; top += 4) {
+    in.read(place, line.data(), line.size());
+    place += line.size();
+    for (std::size_t block = 0; block < across; ++block) {
+      decode_bc6h(std::span(line).subspan(block * kBc6hBytes).first<kBc6hBytes>(), is_signed, halves);
+      for (std::size_t texel = 0; texel < 16; ++texel) {
+        const std::size_t row = top + texel / 4;
+        const std::size_t column = 4 * block + texel % 4;
+        if (row >= side || column >= side) continue;
+        for (std::size_t c = 0; c < 3; ++c) {
+          values[(row * side + column) * 3 + c] = float_from_half(halves[3 * texel + c]);
+        }
+      }
+    }
+  }
+}
+
+// `bytes` of a line of texels or, of compressed ones, of the whole finest level.
+void put_header(ByteWriter& out, const EnvMapLayout& layout, std::uint32_t dxgi, std::size_t bytes,
+                bool is_compressed) {
+  const bool levels = layout.levels > 1;
+  const auto side = static_cast<std::uint32_t>(layout.width);
+  const auto put = [&](std::initializer_list<std::uint32_t> values) {
+    for (const std::uint32_t value : values) out.put(value);
+  };
+  const std::uint32_t size_kind = is_compressed ? kFlagLinearSize : kFlagPitch;
+  put({kMagic, 124, kFlags | size_kind | (levels ? kFlagLevels : 0U), side, side});
+  put({static_cast<std::uint32_t>(bytes), 0, static_cast<std::uint32_t>(layout.levels)});
+  for (int i = 0; i < 11; ++i) put({0});
+  put({32, kFourCc, kDx10, 0, 0, 0, 0, 0});
+  put({kCaps | (levels ? kCapsLevels : 0U), kCube | kAllFaces, 0, 0, 0});
+  put({dxgi, kTexture2d, kMiscCube, 1, layout.channels == 3 ? kOpaque : 0U});
 }
 
 }  // namespace
@@ -90,19 +152,9 @@ SaveReport save_dds(const std::string& path, const EnvMapView& map, PixelFormat 
   const Format& format = *std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& f) {
     return f.channels == stored && f.bytes == (whole ? 4U : 2U);
   });
-  const bool levels = layout.levels > 1;
-  const auto side = static_cast<std::uint32_t>(layout.width);
   ByteWriter out;
-  const auto put = [&](std::initializer_list<std::uint32_t> values) {
-    for (const std::uint32_t value : values) out.put(value);
-  };
-  put({kMagic, 124, kFlags | (levels ? kFlagLevels : 0U), side, side});
-  put({side * static_cast<std::uint32_t>(format.bytes) * static_cast<std::uint32_t>(stored), 0,
-       static_cast<std::uint32_t>(layout.levels)});
-  for (int i = 0; i < 11; ++i) put({0});
-  put({32, kFourCc, kDx10, 0, 0, 0, 0, 0});
-  put({kCaps | (levels ? kCapsLevels : 0U), kCube | kAllFaces, 0, 0, 0});
-  put({format.dxgi, kTexture2d, kMiscCube, 1, layout.channels == 3 ? kOpaque : 0U});
+  put_header(out, layout, format.dxgi,
+             static_cast<std::size_t>(layout.width) * format.bytes * static_cast<std::size_t>(stored), false);
 
   SaveReport report;
   const std::size_t channels = static_cast<std::size_t>(layout.channels);
@@ -125,6 +177,20 @@ SaveReport save_dds(const std::string& path, const EnvMapView& map, PixelFormat 
   return report;
 }
 
+void save_dds_bc6h(const std::string& path, const EnvMapLayout& layout, std::span<const std::byte> blocks) {
+  validate(layout);
+  check_dds_path(path, layout.projection);
+  if (layout.channels != 3) {
+    throw InvalidArgument("channels", std::to_string(layout.channels), "3 in blocks of BC6H");
+  }
+  check_length("blocks", blocks.size(), bc6h_bytes(layout), "bytes of all faces and levels");
+  ByteWriter out;
+  const std::size_t across = blocks_across(layout, 0);
+  put_header(out, layout, kBc6hUnsigned, across * across * kBc6hBytes, true);
+  out.bytes.insert(out.bytes.end(), blocks.begin(), blocks.end());
+  write_file(path, out.bytes);
+}
+
 EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
   FileBytes in(path, limits);
   if (in.get<std::uint32_t>(0) != kMagic || in.get<std::uint32_t>(4) != 124 ||
@@ -142,7 +208,7 @@ EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
     const std::string found = dx10       ? "the DXGI format " + std::to_string(dxgi)
                               : has_code ? "the format code " + std::to_string(code)
                                          : "pixels of integers";
-    throw FileError(path, "has " + found + ", expected float16 or float32 of one to four channels");
+    throw FileError(path, "has " + found + ", expected float16, float32 or BC6H");
   }
   const bool cube = dx10 ? in.get<std::uint32_t>(kHeaderBytes + 4) == kTexture2d &&
                                (in.get<std::uint32_t>(kHeaderBytes + 8) & kMiscCube) != 0 &&
@@ -165,7 +231,8 @@ EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
   if (layout.size() > limits.max_bytes / sizeof(float)) throw FileError(path, "is too large");
   // Whether the file holds what its header promises is known before memory is taken for it.
   std::uint64_t place = kHeaderBytes + (dx10 ? kDx10Bytes : 0);
-  in.require(place, layout.size() * static_cast<std::uint64_t>(format->bytes));
+  const bool is_bc6h = format->bytes == 0;
+  in.require(place, is_bc6h ? bc6h_bytes(layout) : layout.size() * std::uint64_t{format->bytes});
   const bool opaque =
       dx10 && format->channels == 4 && (in.get<std::uint32_t>(kHeaderBytes + 16) & 7U) == kOpaque;
   EnvMap map = make_envmap(layout, default_channels(format->channels));
@@ -173,6 +240,10 @@ EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
   for_each_image(layout, [&](int level, int face) {
     const std::size_t count = values_of_face(layout, level);
     float* values = map.values.data() + layout.level_offset(level) + static_cast<std::size_t>(face) * count;
+    if (is_bc6h) {
+      read_bc6h(in, place, static_cast<std::size_t>(layout.level_width(level)), dxgi == kBc6hSigned, values);
+      return;
+    }
     if (format->bytes == sizeof(float)) {
       in.read(place, values, count * sizeof(float));
     } else {

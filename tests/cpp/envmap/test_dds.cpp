@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -121,13 +122,95 @@ TEST_F(Dds, OlderHeadersAreReadAndOtherPixelsAreNamed) {
   EXPECT_EQ(load_envmap(path("old.dds")).values, map.values);
 
   std::vector<std::byte> compressed = bytes_of("a.dds");
-  set_word(compressed, 128, 95);  // DXGI_FORMAT_BC6H_UF16
-  write_file(path("bc6h.dds"), compressed);
+  set_word(compressed, 128, 98);  // DXGI_FORMAT_BC7_UNORM
+  write_file(path("bc7.dds"), compressed);
   try {
-    load_dds(path("bc6h.dds"));
-    ADD_FAILURE() << "BC6H was read";
+    load_dds(path("bc7.dds"));
+    ADD_FAILURE() << "BC7 was read";
   } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("DXGI format 95"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("DXGI format 98"));
+  }
+}
+
+// One block for every level of every face: of 6 texels a side there are four, of which half lie beyond it.
+TEST_F(Dds, BlocksOfBc6hAreWrittenAndRead) {
+  const EnvMapLayout layout{parse_projection("cube"), 6, 6, 3, 3};
+  std::vector<std::byte> blocks(6 * (4 + 1 + 1) * 16);
+  // The mode of one region with 10 bits: red of both end points is 0x1ff, the rest is 0.
+  for (std::size_t at = 0; at < blocks.size(); at += 16) {
+    blocks[at] = std::byte{0xe3};
+    blocks[at + 1] = std::byte{0x3f};
+    blocks[at + 4] = std::byte{0xf8};
+    blocks[at + 5] = std::byte{0x0f};
+  }
+  save_dds_bc6h(path("a.dds"), layout, blocks);
+  EXPECT_EQ(word(bytes_of("a.dds"), 128), 95u);
+  EXPECT_EQ(word(bytes_of("a.dds"), 20), 4u * 16u);  // bytes of a face
+  const EnvMap map = load_envmap(path("a.dds"));
+  ASSERT_EQ(map.layout, layout);
+  // ((0x1ff · 65536 + 32768) / 1024 · 31) / 64 as the bits of a half float.
+  const float red = float_from_half(((0x1ff * 0x10000 + 0x8000) >> 10) * 31 >> 6);
+  for (std::size_t i = 0; i < map.values.size(); ++i) EXPECT_EQ(map.values[i], i % 3 == 0 ? red : 0.0F) << i;
+  EXPECT_THROW(save_dds_bc6h(path("b.dds"), layout, std::span(blocks).first(16)), InvalidArgument);
+  std::vector<std::byte> bytes = bytes_of("a.dds");
+  write_file(path("short.dds"), std::span(bytes).first(bytes.size() - 1));
+  EXPECT_THROW(load_dds(path("short.dds")), FileError);
+}
+
+struct Example {
+  unsigned mode;
+  bool is_signed;
+  std::uint32_t hash;  // FNV-1a of the 48 half floats
+};
+
+// What bcdec 0.98 (Sergii Kudlai, another decoder) makes of blocks of arbitrary bits in every mode.
+constexpr std::array<Example, 30> kExamples = {{
+    {0, false, 0x1d4225efU},  {1, false, 0x19142e31U},  {2, false, 0x14354299U},  {6, false, 0x6ca6006bU},
+    {10, false, 0x382f270fU}, {14, false, 0x1688d98cU}, {18, false, 0x0a0ed529U}, {22, false, 0x9a8db9b9U},
+    {26, false, 0xc1337f66U}, {30, false, 0xfe2ea472U}, {3, false, 0xc5912861U},  {7, false, 0x4509a810U},
+    {11, false, 0xfd40aaabU}, {15, false, 0xd73b926fU}, {19, false, 0xc655ff85U}, {0, true, 0x45507ce2U},
+    {1, true, 0xa032571aU},   {2, true, 0xbe937bd5U},   {6, true, 0x687a2210U},   {10, true, 0x76ce7924U},
+    {14, true, 0x3ab2e405U},  {18, true, 0x0f2b522bU},  {22, true, 0x207bde58U},  {26, true, 0xc419db39U},
+    {30, true, 0x96e05011U},  {3, true, 0x239bfe40U},   {7, true, 0x49ed0e99U},   {11, true, 0x41a0f176U},
+    {15, true, 0x268fec5eU},  {19, true, 0xc655ff85U},
+}};
+
+TEST_F(Dds, EveryModeOfBc6hIsDecodedAsByAnotherDecoder) {
+  const EnvMapLayout layout{parse_projection("cube"), 4, 4, 1, 3};
+  for (const Example& example : kExamples) {
+    std::vector<std::byte> blocks(6 * 16);
+    for (unsigned i = 0; i < blocks.size(); ++i) {
+      blocks[i] = static_cast<std::byte>((37U * (i % 16) + 101U * example.mode + 59U) * 2654435761U >> 13U);
+    }
+    const unsigned mask = example.mode < 2 ? 3U : 31U;
+    for (std::size_t face = 0; face < 6; ++face) {
+      blocks[16 * face] =
+          static_cast<std::byte>((static_cast<unsigned>(blocks[16 * face]) & ~mask) | example.mode);
+    }
+    save_dds_bc6h(path("a.dds"), layout, blocks);
+    std::vector<std::byte> bytes = bytes_of("a.dds");
+    set_word(bytes, 128, example.is_signed ? 96 : 95);
+    write_file(path("a.dds"), bytes);
+    const EnvMap map = load_dds(path("a.dds"));
+    for (std::size_t face = 0; face < 6; ++face) {
+      std::uint32_t hash = 2166136261U;
+      for (std::size_t i = 0; i < 48; ++i)
+        hash = (hash ^ half_from_float(map.values[48 * face + i])) * 16777619U;
+      EXPECT_EQ(hash, example.hash) << example.mode << (example.is_signed ? " signed" : "");
+    }
+  }
+}
+
+TEST_F(Dds, NoBlockOfBc6hIsInfiniteOrNan) {
+  const EnvMapLayout layout{parse_projection("cube"), 64, 64, 1, 3};
+  std::vector<std::byte> blocks(6 * 256 * 16);
+  for (std::size_t i = 0; i < blocks.size(); ++i) blocks[i] = static_cast<std::byte>(hash64(i));
+  save_dds_bc6h(path("a.dds"), layout, blocks);
+  std::vector<std::byte> bytes = bytes_of("a.dds");
+  for (const std::uint32_t dxgi : {95U, 96U}) {
+    set_word(bytes, 128, dxgi);
+    write_file(path("a.dds"), bytes);
+    EXPECT_EQ(count_not_finite(load_dds(path("a.dds"))), 0U);
   }
 }
 

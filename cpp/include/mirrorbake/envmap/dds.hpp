@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <string>
 
 #include "mirrorbake/envmap/envmap.hpp"
@@ -23,9 +25,14 @@ SaveReport save_dds(const std::string& path, const EnvMapView& map,
 void check_dds_path(const std::string& path, const Projection& projection,
                     PixelFormat format = PixelFormat::automatic);
 
-/// Reads a cube map of float16 or float32 with one to four channels and any number of levels, with a DX10
-/// header or the older codes of such pixels (as cmft writes). An alpha that is opaque is left out. Throws
-/// FileError for anything else (such as the compressed BC6H), damaged files and those beyond `limits`.
+/// Writes blocks that an encoder has made of a cube of three channels: BC6H_UF16, all levels of a face, one
+/// face after the other, (width + 3)/4 squared blocks of 16 bytes each. Throws InvalidArgument for another
+/// number of bytes and what is no such cube, FileError if the file cannot be written.
+void save_dds_bc6h(const std::string& path, const EnvMapLayout& layout, std::span<const std::byte> blocks);
+
+/// Reads a cube map of float16 or float32 with one to four channels, or of BC6H, with any number of levels,
+/// with a DX10 header or the older codes of such pixels (as cmft writes). An alpha that is opaque is left
+/// out. Throws FileError for anything else, damaged files and those beyond `limits`.
 EnvMap load_dds(const std::string& path, const ImageLimits& limits = {});
 
 }  // namespace mirrorbake

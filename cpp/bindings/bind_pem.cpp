@@ -73,6 +73,22 @@ void bind_pem(nb::module_& m) {
       "black.\nReturns float32 (H, W, 4): light times coverage, and coverage.");
 
   m.def(
+      "shell_light",
+      [](const SurfaceSamples& samples, const OwnedShellMap& map, const RunTimeModel& run_time) {
+        std::vector<glm::vec4> light;
+        {
+          const nb::gil_scoped_release unlocked;
+          light = shell_light(samples, map.view(), run_time);
+        }
+        return vectors_to_numpy(std::move(light));
+      },
+      nb::arg("samples"), nb::arg("map"), nb::arg("run_time") = reference_run_time(),
+      nb::sig("def shell_light(samples: SurfaceSamples, map: ShellMap, run_time: RunTimeModel = ...) -> "
+              "numpy.typing.NDArray[numpy.float32]"),
+      "What every sample reads of one shell's map, float32 (len(samples), 4): premultiplied light, not yet "
+      "times F, and\nalpha, which is 0 where the shell leaves the sample's triangle out.");
+
+  m.def(
       "diffuse_from_irradiance",
       [](const SurfaceSamples& samples,
          nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu> triangles,

@@ -10,6 +10,7 @@
 #include "bind_enums.hpp"
 #include "mirrorbake/surface/run_time_model.hpp"
 #include "mirrorbake/surface/surface_samples.hpp"
+#include "mirrorbake/surface/vertex_lookups.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -96,6 +97,24 @@ void bind_samples(nb::module_& m) {
       "Front to back: the incident radiance is L0 + (1 - a0)(L1 + ...).");
 }
 
+void bind_vertex_lookups(nb::module_& m) {
+  m.def(
+      "with_vertex_lookups",
+      [](const SurfaceSamples& samples, PointArray positions,
+         nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu> triangles,
+         PointArray lookups) {
+        const nb::gil_scoped_release unlocked;
+        return with_vertex_lookups(
+            samples, {reinterpret_cast<const glm::vec3*>(positions.data()), positions.shape(0)},
+            {reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0)},
+            {reinterpret_cast<const glm::vec3*>(lookups.data()), lookups.shape(0)});
+      },
+      nb::arg("samples"), nb::arg("positions"), nb::arg("triangles"), nb::arg("lookups"),
+      "Samples that read a map at coordinates of the vertices, float32 (V, 3), interpolated over every "
+      "triangle ([PEM]\nsection 5): texture coordinates (u, v, 0), or lookups on a proxy. To be read through "
+      "Proxy.infinite, since\n`reflection` is then the lookup itself, of any length.");
+}
+
 RunTimeModel checked(RunTimeModel model) {
   validate(model);
   return model;
@@ -135,6 +154,7 @@ void bind_run_time(nb::module_& m) {
 void bind_surface(nb::module_& m) {
   bind_shell_light(m);
   bind_samples(m);
+  bind_vertex_lookups(m);
   bind_run_time(m);
 }
 

@@ -967,6 +967,13 @@ class SurfaceSamples:
     def shells(self) -> list[ShellLight]:
         """Front to back: the incident radiance is L0 + (1 - a0)(L1 + ...)."""
 
+def with_vertex_lookups(samples: SurfaceSamples, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], lookups: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> SurfaceSamples:
+    """
+    Samples that read a map at coordinates of the vertices, float32 (V, 3), interpolated over every triangle ([PEM]
+    section 5): texture coordinates (u, v, 0), or lookups on a proxy. To be read through Proxy.infinite, since
+    `reflection` is then the lookup itself, of any length.
+    """
+
 class RunTimeModel:
     """
     How the renderer that will draw the maps reads them: what a map is inferred for.
@@ -1843,6 +1850,12 @@ def render_reflector(samples: SurfaceSamples, parts: Sequence[Sequence[ShellMap]
 
     parts: the shells of each part, front to back. diffuse: float32 (len(samples), 3) or None for black.
     Returns float32 (H, W, 4): light times coverage, and coverage.
+    """
+
+def shell_light(samples: SurfaceSamples, map: ShellMap, run_time: RunTimeModel = ...) -> numpy.typing.NDArray[numpy.float32]:
+    """
+    What every sample reads of one shell's map, float32 (len(samples), 4): premultiplied light, not yet times F, and
+    alpha, which is 0 where the shell leaves the sample's triangle out.
     """
 
 def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], vertex_irradiance: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:

@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from mirrorbake import _core
 from mirrorbake.bake.bake import bake
 from mirrorbake.evaluate import references
-from mirrorbake.evaluate.contenders import CONTENDERS, TITLES, Frame, SingleLayer, contenders_of
+from mirrorbake.evaluate.contenders import CONTENDERS, TITLES, Frame, contenders_of, run_time_of
 from mirrorbake.evaluate.evaluate import METRICS, Evaluation, ViewFigures, evaluate
 from mirrorbake.evaluate.metrics import mean_squared_error, psnr
 from mirrorbake.evaluate.places import View, angle_between, choose_views, elevation, turned
@@ -28,6 +29,13 @@ from mirrorbake.evaluate.references import (
     object_window,
     refined_reference,
     trace_reference,
+)
+from mirrorbake.evaluate.single_maps import (
+    SingleMaps,
+    Targets,
+    has_own_texels,
+    layer_at_infinity,
+    layer_on_surface,
 )
 from mirrorbake.evaluate.table import metrics_tables
 from mirrorbake.pem.opened import OpenedPem, open_pem
@@ -291,7 +299,7 @@ def test_every_contender_draws_every_view(baked: Baked) -> None:
         assert picture.max() > 0.1
     # Past the end of the arc there is nothing to blend.
     np.testing.assert_array_equal(pictures["pem"], pictures["pem_nearest"])
-    assert len({picture.tobytes() for name, picture in pictures.items() if name != "pem_nearest"}) == 4
+    assert len({picture.tobytes() for name, picture in pictures.items() if name != "pem_nearest"}) == 5
 
 
 def test_a_single_layer_at_infinity_is_good_on_its_sample_and_slides_off_it(baked: Baked) -> None:
@@ -310,16 +318,53 @@ def test_a_single_layer_at_infinity_is_good_on_its_sample_and_slides_off_it(bake
     assert pem_off > off
 
 
-def test_a_single_layer_is_blended_as_a_pem_is(baked: Baked) -> None:
+def test_a_texture_is_best_on_its_sample_and_pasted_on_off_it(baked: Baked) -> None:
+    def figure(contender: str, place: str) -> float:
+        value = baked.evaluation.mean(contender, place)
+        assert value is not None
+        return value
+
+    # [PEM] figure 7: a texture shows its own view, whose reflections stick to the surface in all others.
+    assert figure("ptm", "on") > figure("pem_single_infinite", "on")
+    assert figure("ptm", "off_15") < figure("pem", "off_15") - 3.0
+    assert figure("ptm", "on") - figure("ptm", "off_15") > figure("pem", "on") - figure("pem", "off_15") + 5.0
+
+
+@pytest.mark.parametrize("fit", ["layers", "display"])
+def test_single_maps_are_blended_as_a_pem_is(baked: Baked, tmp_path: Path, fit: str) -> None:
     pem = baked.open()
-    layer = SingleLayer(pem)
-    view = View("between", 0.5, (0.25,), baked.stage.built.cameras.camera((0.25,)))
-    window = object_window(baked.stage, view.camera)
-    frame = Frame(pem, view, window)
-    blend = layer.render(frame, "reference")
-    ends = [layer.render(Frame(pem, View("", 0, (t,), view.camera), window), "reference") for t in (0.0, 0.5)]
-    # One layer is linear in its map.
-    np.testing.assert_allclose(blend, 0.5 * (ends[0] + ends[1]), rtol=1e-4, atol=1e-5)
+    if fit == "display":
+        scene = {**SMALL, "infer": {"iterations": 40}, "auto": {"quality": "draft"}}
+        stage = prepare_stage(parse_config(scene, "display"))
+        bake(stage.config, tmp_path / "pem", None, stage)
+        pem = open_pem(tmp_path / "pem", stage)
+    targets = Targets(pem)
+    camera = pem.stage.built.cameras.camera((0.25,))
+    view = View("between", 0.5, (0.25,), camera)
+    frame = Frame(pem, view, object_window(pem.stage, camera))
+    on_surface = layer_on_surface(pem)
+    assert on_surface is not None
+    for layer in (layer_at_infinity(pem), on_surface):
+        maps, model = SingleMaps(pem, targets, layer), run_time_of(pem, "web")
+        samples = frame.samples("web")
+        blend = maps.render((0.25,), samples, model)
+        assert blend.max() > 0.1
+        ends = [maps.render((t,), samples, model) for t in (0.0, 0.5)]
+        # One layer is linear in its map.
+        np.testing.assert_allclose(blend, 0.5 * (ends[0] + ends[1]), rtol=1e-4, atol=1e-5)
+
+
+def test_only_coordinates_of_its_own_give_a_surface_a_texture() -> None:
+    teapot = _core.make_teapot(6)
+    positions, triangles = np.asarray(teapot.positions), np.asarray(teapot.triangles)
+    uvs = np.asarray(teapot.uvs)
+    assert has_own_texels(positions, triangles, uvs)
+    assert not has_own_texels(positions, triangles, np.zeros((0, 2), np.float32))
+    assert not has_own_texels(positions, triangles, np.float32(2.0) * uvs)
+    # Two halves of the surface on the same half of the texture.
+    mirrored = np.stack([np.abs(uvs[:, 0] - np.float32(0.5)), uvs[:, 1]], axis=1)
+    assert not has_own_texels(positions, triangles, mirrored)
+    assert not has_own_texels(positions, triangles, np.zeros_like(uvs))
 
 
 # Figures

@@ -100,6 +100,21 @@ Image render_reflector(const SurfaceSamples& samples, std::span<const PartShells
   return image;
 }
 
+std::vector<glm::vec4> shell_light(const SurfaceSamples& samples, const ShellMap& map,
+                                   const RunTimeModel& model) {
+  check_lookup_arrays(samples);
+  validate(model);
+  check_part("part", {map}, samples);
+  std::vector<glm::vec4> light(samples.size(), glm::vec4(0.0F));
+  parallel_for(samples.size(), kPixelsPerChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!map.triangles.empty() && map.triangles[samples.triangle[i]] == 0) continue;
+      light[i] = read(map, lookup(samples, i, map.proxy, map.topology, model));
+    }
+  });
+  return light;
+}
+
 std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
                                                std::span<const glm::uvec3> triangles,
                                                std::span<const glm::vec3> vertex_irradiance) {

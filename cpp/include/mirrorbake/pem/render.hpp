@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include "mirrorbake/envmap/texel_topology.hpp"
 #include "mirrorbake/image/image.hpp"
@@ -37,6 +38,12 @@ using PartShells = std::vector<ShellMap>;
 /// fit.
 Image render_reflector(const SurfaceSamples& samples, std::span<const PartShells> parts,
                        std::span<const glm::vec3> diffuse, const RunTimeModel& model = reference_run_time());
+
+/// What every sample reads of one shell's map: premultiplied light, not yet times F, and α, which is 0 where
+/// the shell leaves the sample's triangle out. For renderers that put the layers together by themselves.
+/// Throws as render_reflector does.
+std::vector<glm::vec4> shell_light(const SurfaceSamples& samples, const ShellMap& map,
+                                   const RunTimeModel& model = reference_run_time());
 
 /// D of every sample from irradiance baked per vertex: albedo/π times the irradiance interpolated over the
 /// triangle.

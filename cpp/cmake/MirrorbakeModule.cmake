@@ -69,7 +69,8 @@ function(mirrorbake_add_test module)
   gtest_discover_tests(${target} TEST_PREFIX "${module}." DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600)
 endfunction()
 
-# mirrorbake_add_tool(NAME SOURCES ... DEPENDS module...): one command-line program NAME.
+# mirrorbake_add_tool(NAME SOURCES ... DEPENDS module...): one command-line program NAME. In a wheel it lies where pip puts
+# programs, and finds the library that it loads in the package.
 function(mirrorbake_add_tool name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;DEPENDS;PRIVATE")
   add_executable(${name} ${arg_SOURCES})
@@ -79,7 +80,17 @@ function(mirrorbake_add_tool name)
   endforeach()
   target_compile_definitions(${name} PRIVATE MIRRORBAKE_VERSION="${PROJECT_VERSION}")
   file(RELATIVE_PATH library_dir ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR}/mirrorbake)
-  set_target_properties(${name} PROPERTIES
-    INSTALL_RPATH "$<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>/${library_dir}")
+  set(run_path "$<IF:$<PLATFORM_ID:Darwin>,@loader_path,$ORIGIN>/")
+  set(library_dirs ${library_dir})
+  # An editable package has no programs: pip would not renew them. script/bootstrap links to those of the build tree.
+  if(DEFINED SKBUILD_SCRIPTS_DIR AND NOT SKBUILD_STATE STREQUAL "editable")
+    # From bin/: of an environment, where libraries have a folder of their own, of Debian's Python, and of pip's --target.
+    set(python python${Python_VERSION_MAJOR}.${Python_VERSION_MINOR})
+    set(library_dirs ../lib/${python}/site-packages/mirrorbake ../lib64/${python}/site-packages/mirrorbake
+                     ../lib/${python}/dist-packages/mirrorbake ../mirrorbake)
+    install(TARGETS ${name} RUNTIME DESTINATION ${SKBUILD_SCRIPTS_DIR} COMPONENT python)
+  endif()
+  list(TRANSFORM library_dirs PREPEND "${run_path}")
+  set_target_properties(${name} PROPERTIES INSTALL_RPATH "${library_dirs}")
   install(TARGETS ${name} COMPONENT tools)
 endfunction()

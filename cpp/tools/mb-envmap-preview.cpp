@@ -40,7 +40,7 @@ class Preview final : public EnvmapCommand {
     app->add_option("--exposure", exposure_, "stops by which radiance is raised")
         ->capture_default_str()
         ->check(CLI::Range(-20.0F, 20.0F));
-    app->add_option("--tone", tone_, "tone mapping: neutral, or none, which clips")
+    app->add_option("--tone-map", tone_, "tone mapping: neutral, or none, which clips")
         ->capture_default_str()
         ->check(CLI::IsMember({"neutral", "none"}));
   }

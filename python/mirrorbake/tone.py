@@ -74,7 +74,7 @@ def check_display(exposure: float, tone: str) -> None:
     if not -20.0 <= exposure <= 20.0:
         raise OptionError(f"exposure = {exposure:g}: expected -20 to 20 stops")
     if tone not in TONES:
-        raise OptionError(f"tone = {tone!r}: expected {' or '.join(TONES)}")
+        raise OptionError(f"tone-map = {tone!r}: expected {' or '.join(TONES)}")
 
 
 def srgb_bytes(linear: FloatArray) -> NDArray[np.uint8]:

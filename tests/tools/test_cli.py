@@ -21,9 +21,12 @@ from typer.testing import CliRunner
 from mirrorbake import _core
 from mirrorbake.commands.main import app
 from mirrorbake.evaluate.contenders import CONTENDERS
+from mirrorbake.pem.opened import open_pem
+from mirrorbake.pem.render import picture_of
 from mirrorbake.pem.store import GROUP_NAME, PemStore
 from mirrorbake.scene.load import load_config
 from mirrorbake.scene.plan import DECIDED_KEYS
+from mirrorbake.tone import tone_map
 
 EXIT_USAGE, EXIT_INPUT = 2, 3
 
@@ -133,7 +136,7 @@ def test_a_process_ends_with_the_status_and_the_streams_of_the_manual(tmp_path: 
     assert json.loads(result.stdout)["views"][0]["place"] == "on"
 
 
-@pytest.mark.parametrize("command", ["bake", "analyze", "evaluate", "render", "demo"])
+@pytest.mark.parametrize("command", ["bake", "analyze", "evaluate", "sheet", "render", "demo"])
 def test_every_command_explains_itself(command: str) -> None:
     result = run(command, "--help")
     assert result.returncode == 0
@@ -156,14 +159,30 @@ def test_every_command_explains_itself(command: str) -> None:
         ["evaluate"],
         ["render", "dir", "--out", "a.png"],
         ["render", "dir", "--view", "half", "--out", "a.png"],
+        ["render", "dir", "--view", "0", "--frames", "2", "--out", "a.png"],
+        ["render", "dir", "--frames", "2", "--away", "1,0", "--out", "a{}.png"],
+        ["sheet"],
+        ["export", "dir"],
     ],
 )
 def test_wrong_usage_is_exit_2(tmp_path: Path, arguments: list[str]) -> None:
     result = run(*arguments, cwd=tmp_path)
     assert result.returncode == EXIT_USAGE
     assert result.stdout == ""
-    assert "Traceback" not in result.stderr
+    assert result.stderr.startswith("mirrorbake: error: ")
+    assert result.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "found"), [("mirrorbake sh", "sheet"), ("mirrorbake render --tone", "--tone-map")]
+)
+def test_the_shell_completes_commands_and_options(words: str, found: str) -> None:
+    program = Path(sys.executable).with_name("mirrorbake")
+    shell = {"COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    environment = os.environ | shell | {"_MIRRORBAKE_COMPLETE": "complete_bash"}
+    result = subprocess.run([program], capture_output=True, text=True, env=environment, check=False)
+    assert result.stdout.split() == [found], result.stderr
 
 
 @pytest.mark.parametrize(
@@ -439,6 +458,38 @@ def test_render_writes_a_picture_of_any_view(baked: Path, tmp_path: Path, name: 
     assert np.isfinite(pixels).all()
     assert pixels.std() > 0.01
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_render_walks_from_end_to_end(baked: Path, tmp_path: Path) -> None:
+    result = run("render", baked, "--frames", "2", "--out", tmp_path / "walk{}.exr")
+    assert result.returncode == 0, result.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["walk0000.exr", "walk0001.exr"]
+    run("render", baked, "--view", "1", "--out", tmp_path / "end.exr")
+    assert (tmp_path / "end.exr").read_bytes() == (tmp_path / "walk0001.exr").read_bytes()
+
+
+def test_render_exposes_pictures_for_displays(baked: Path, tmp_path: Path) -> None:
+    darker, mapped = (tmp_path / name for name in ("darker.png", "mapped.png"))
+    scene = picture_of(open_pem(baked), 0.5)
+    for picture, options in ((darker, ("--exposure=-2",)), (mapped, ("--tone-map", "neutral"))):
+        assert run("render", baked, "--view", "0.5", *options, "--out", picture).returncode == 0
+    for picture, shown in ((darker, scene / 4), (mapped, tone_map(scene))):
+        # Half a step of 8 bits, where sRGB is steepest in light.
+        assert _core.load_image(str(picture))[0] == pytest.approx(np.clip(shown, 0, 1), abs=0.005)
+    result = run("render", baked, "--view", "0.5", "--exposure", "1", "--out", tmp_path / "a.exr")
+    assert_one_error(result, "an .exr holds scene-linear radiance", status=EXIT_USAGE)
+
+
+@pytest.mark.parametrize("views", ["views.kind=none", "views.count=1"])
+def test_a_contact_sheet_of_any_parameter_space(tmp_path: Path, views: str) -> None:
+    pem = tmp_path / "pem"
+    assert run("bake", write_scene(tmp_path), "--out", pem, "--set", views).returncode == 0
+    result = run("sheet", pem)
+    assert result.returncode == 0, result.stderr
+    pixels, _ = _core.load_image(str(pem / "contact-sheet.png"))
+    assert min(pixels.shape[:2]) > 300
+    assert pixels.std() > 0.1
+    assert_one_error(run("sheet", pem, "--out", tmp_path / "a.gif"), "a name that ends in .png")
 
 
 @pytest.mark.parametrize(

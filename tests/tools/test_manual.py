@@ -35,6 +35,7 @@ COMMANDS = [
             "evaluate",
             "report",
             "info",
+            "sheet",
             "render",
             "verify",
             "export",

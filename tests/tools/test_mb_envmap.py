@@ -334,7 +334,7 @@ def test_preview_is_tone_mapped_as_everywhere(tmp_path: Path) -> None:
     EnvMap.from_array(values, "latlong").save(tmp_path / "in.exr", format="float32")
     arguments = ("preview", tmp_path / "in.exr", "--size", 16, "--exposure", -1)
     for tone in ("neutral", "none"):
-        mb_envmap(*arguments, "--tone", tone, "-o", tmp_path / "out.png")
+        mb_envmap(*arguments, "--tone-map", tone, "-o", tmp_path / "out.png")
         expected = np.clip(displayed(values, -1.0, tone), 0, 1)
         # Steps of 1/255 in sRGB are at most 0.009 of linear light.
         shown = EnvMap.load(tmp_path / "out.png").level()

@@ -15,6 +15,7 @@ from mirrorbake.commands.options import (
     EmSize,
     Json,
     ObjectFile,
+    Quality,
     Seed,
     Size,
     Sky,
@@ -39,6 +40,7 @@ def analyze_command(
     em_size: EmSize = None,
     seed: Seed = None,
     assignments: Assignments = None,
+    quality: Quality = None,
     json: Json = False,
     threads: Threads = 0,
 ) -> None:
@@ -48,7 +50,9 @@ def analyze_command(
     from mirrorbake.bake.analyze import analyze
     from mirrorbake.scene.stage import prepare_stage
 
-    config = scene_config(scene, assignments, views, size, spp, em_size, seed, object_file, sky, draft=draft)
+    config = scene_config(
+        scene, assignments, views, size, spp, em_size, seed, object_file, sky, draft=draft, quality=quality
+    )
     with _core.ThreadLimit(threads):
         plan = analyze(prepare_stage(config))
     if json:

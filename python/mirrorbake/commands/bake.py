@@ -14,6 +14,7 @@ from mirrorbake.commands.options import (
     Draft,
     EmSize,
     ObjectFile,
+    Quality,
     Seed,
     Size,
     Sky,
@@ -62,12 +63,7 @@ def bake_command(
     em_size: EmSize = None,
     seed: Seed = None,
     assignments: Assignments = None,
-    quality: Annotated[
-        str | None,
-        typer.Option(
-            "--quality", metavar="draft|normal|high", help="What the bake may spend: sets auto.quality."
-        ),
-    ] = None,
+    quality: Quality = None,
     samples: Annotated[
         str | None,
         typer.Option("--samples", metavar="I:J", help="Only samples I to J-1. [default: all]"),
@@ -91,9 +87,9 @@ def bake_command(
     from mirrorbake.bake.bake import bake
     from mirrorbake.scene.parameters import space_of
 
-    if quality is not None:
-        assignments = [*(assignments or []), f"auto.quality={quality}"]
-    config = scene_config(scene, assignments, views, size, spp, em_size, seed, object_file, sky, draft=draft)
+    config = scene_config(
+        scene, assignments, views, size, spp, em_size, seed, object_file, sky, draft=draft, quality=quality
+    )
     chosen = None if samples is None else _parse_samples(samples, len(space_of(config)))
 
     def announce(found: Estimate) -> bool:

@@ -9,10 +9,7 @@ import typer
 
 from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
-from mirrorbake.commands.options import (
-    Folder,
-    Threads,
-)
+from mirrorbake.commands.options import Exposure, Folder, Threads, ToneMap
 from mirrorbake.commands.progress import messages, progress
 
 if TYPE_CHECKING:
@@ -64,15 +61,8 @@ def export_command(
         typer.Option("--frames", metavar="N", help="Of --video and --stills. [default: one per sample]"),
     ] = None,
     fps: Annotated[int, typer.Option("--fps", metavar="N", help="Frames per second of --video.")] = 30,
-    exposure: Annotated[
-        float, typer.Option("--exposure", metavar="STOPS", help="Of --video and PNG stills.")
-    ] = 0.0,
-    tone: Annotated[
-        str,
-        typer.Option(
-            "--tone", metavar="none|neutral", help="Tone mapping of both: clipped, or Khronos PBR Neutral."
-        ),
-    ] = "none",
+    exposure: Exposure = 0.0,
+    tone: ToneMap = "none",
     sample: Annotated[
         int | None,
         typer.Option(

@@ -14,25 +14,28 @@ from mirrorbake import _core
 from mirrorbake.commands.analyze import analyze_command
 from mirrorbake.commands.bake import bake_command
 from mirrorbake.commands.demo import demo_command
+from mirrorbake.commands.errors import OneLineErrors
 from mirrorbake.commands.evaluate import evaluate_command
 from mirrorbake.commands.export import export_command
 from mirrorbake.commands.info import info_command, verify_command
 from mirrorbake.commands.render import render_command
 from mirrorbake.commands.report import report_command
+from mirrorbake.commands.sheet import sheet_command
 from mirrorbake.commands.study import app as study_app
 from mirrorbake.commands.view import view_command
 
 app = typer.Typer(
     name="mirrorbake",
     help="Bake the reflections of shiny objects into parameterized environment maps.",
+    cls=OneLineErrors,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 app.command("bake")(bake_command)
 app.command("analyze")(analyze_command)
 app.command("evaluate")(evaluate_command)
 app.command("report")(report_command)
+app.command("sheet")(sheet_command)
 app.command("render")(render_command)
 app.command("export")(export_command)
 app.command("view")(view_command)

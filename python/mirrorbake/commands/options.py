@@ -76,6 +76,17 @@ Assignments = Annotated[
 ]
 
 
+Exposure = Annotated[
+    float, typer.Option("--exposure", metavar="STOPS", help="Of films and PNG pictures: factor 2^STOPS.")
+]
+ToneMap = Annotated[
+    str,
+    typer.Option(
+        "--tone-map",
+        metavar="none|neutral",
+        help="Of films and PNG pictures: clipped, or by Khronos PBR Neutral.",
+    ),
+]
 ObjectFile = Annotated[
     Path | None,
     typer.Option(
@@ -85,6 +96,12 @@ ObjectFile = Annotated[
 Sky = Annotated[
     Path | None,
     typer.Option("--sky", metavar="FILE", help="A panorama around it. [default: surroundings]"),
+]
+Quality = Annotated[
+    str | None,
+    typer.Option(
+        "--quality", metavar="draft|normal|high", help="What the bake may spend. [default: auto.quality]"
+    ),
 ]
 Draft = Annotated[
     bool | None,
@@ -109,6 +126,7 @@ def scene_config(
     sky: Path | None = None,
     *,
     draft: bool | None = None,
+    quality: str | None = None,
 ) -> SceneConfig:
     """Load a scene file, with --set and the options that have names of their own instead of its values."""
     from mirrorbake.scene.load import load_config
@@ -123,6 +141,7 @@ def scene_config(
         ("trace", "samples"): spp,
         ("maps", "size"): em_size,
         ("trace", "seed"): seed,
+        ("auto", "quality"): quality,
     }
     overrides: list[tuple[tuple[str, ...], Any]] = [_parse_set(text) for text in assignments or []]
     overrides += [(key, value) for key, value in named.items() if value is not None]

@@ -10,11 +10,8 @@ import typer
 
 from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
-from mirrorbake.commands.options import (
-    Folder,
-    Threads,
-)
-from mirrorbake.commands.progress import messages
+from mirrorbake.commands.options import Exposure, Folder, Threads, ToneMap
+from mirrorbake.commands.progress import messages, progress
 from mirrorbake.errors import OptionError
 
 
@@ -31,37 +28,68 @@ def _parse_point(text: str) -> tuple[float, ...]:
 @reports_errors
 def render_command(
     directory: Folder,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="An .exr (scene-linear) or a .png (sRGB). With --frames, {} stands for the number.",
+            show_default=False,
+        ),
+    ],
     view: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--view",
             metavar="T",
             help="Point of the parameter space: 0 to 1 along an arc; azimuth,elevation of a dome.",
             show_default=False,
         ),
-    ],
-    out: Annotated[
-        Path,
+    ] = None,
+    frames: Annotated[
+        int | None,
         typer.Option(
-            "--out", metavar="FILE", help="An .exr (scene-linear) or a .png (sRGB).", show_default=False
+            "--frames",
+            metavar="N",
+            help="Instead of --view: N pictures along the first axis of the parameter space.",
+            show_default=False,
         ),
-    ],
+    ] = None,
     away: Annotated[
         str,
         typer.Option(
             "--away",
             metavar="AZIMUTH,ELEVATION",
-            help="Degrees that the eye moves on from there; the PEM fades to its static set.",
+            help="Of --view: degrees that the eye moves on from there; the PEM fades to its static set.",
         ),
     ] = "0,0",
+    exposure: Exposure = 0.0,
+    tone: ToneMap = "none",
     threads: Threads = 0,
 ) -> None:
     """Draw a PEM at any point of its parameter space, blended between the neighbouring samples."""
-    from mirrorbake.pem.render import render
-
+    if (view is None) == (frames is None):
+        raise OptionError("expected --view T for one picture, or --frames N for a walk, and not both")
+    moved = _parse_point(away)
+    if len(moved) != 2:
+        raise OptionError(f"away = {away}: expected degrees of azimuth and elevation, such as 0,10")
     with _core.ThreadLimit(threads):
-        moved = _parse_point(away)
-        if len(moved) != 2:
-            raise OptionError(f"away = {away}: expected degrees of azimuth and elevation, such as 0,10")
-        render(directory, _parse_point(view), out, (moved[0], moved[1]))
+        if view is not None:
+            from mirrorbake.pem.render import render
+
+            point = _parse_point(view)
+            render(directory, point, out, (moved[0], moved[1]), exposure=exposure, tone=tone)
+        else:
+            if any(moved):
+                raise OptionError(f"away = {away}: goes with --view, not with --frames")
+            _render_frames(directory, out, frames, exposure, tone)
     messages.print(f"wrote {out}", markup=False, soft_wrap=True)
+
+
+def _render_frames(directory: Path, out: Path, frames: int | None, exposure: float, tone: str) -> None:
+    from mirrorbake.pem.export.video import export_stills
+    from mirrorbake.pem.opened import open_pem
+
+    pem = open_pem(directory)
+    with progress() as add_bar:
+        export_stills(pem, out, frames=frames, exposure=exposure, tone=tone, report=add_bar("render"))

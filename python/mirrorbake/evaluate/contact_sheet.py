@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from mirrorbake.evaluate.references import Window
     from mirrorbake.pem.opened import OpenedPem
 
+SHEET_NAME = "contact-sheet.png"
+
 ERROR_RANGE = 0.25
 """Display-referred error at which the colour scale of the error images ends."""
 
@@ -70,8 +72,10 @@ def contact_sheet(pem: OpenedPem, path: Path) -> None:
     Raises
     ------
     InputError
-        The object covers no pixel of those views, or the file cannot be written.
+        The object covers no pixel of those views, or the file is no .png or cannot be written.
     """
+    if path.suffix.lower() != ".png":
+        raise InputError(f"{path}: expected a name that ends in .png")
     middle = pem.space.sample((len(pem.space) - 1) // 2)
     views = choose_views(pem.stage.built.cameras, pem.space, every=True)
     first = next(i for i, view in enumerate(views) if view.place == "on" and view.point == middle)

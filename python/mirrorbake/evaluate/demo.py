@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mirrorbake.bake.bake import bake
-from mirrorbake.evaluate.contact_sheet import contact_sheet
+from mirrorbake.evaluate.contact_sheet import SHEET_NAME, contact_sheet
 from mirrorbake.evaluate.evaluate import evaluate
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.scene.load import parse_config
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from mirrorbake.bake.bake import ProgressReport
     from mirrorbake.evaluate.evaluate import Evaluation
     from mirrorbake.scene.config import SceneConfig
-
-SHEET_NAME = "contact-sheet.png"
 
 
 def demo_config() -> SceneConfig:

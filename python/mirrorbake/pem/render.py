@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mirrorbake import _core
-from mirrorbake.errors import InputError
+from mirrorbake.errors import InputError, OptionError
 from mirrorbake.files import check_writable
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.pem.view_images import images_of_trace
+from mirrorbake.tone import check_display, displayed
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -26,6 +27,9 @@ def render(
     point: PointLike,
     out: str | PathLike[str],
     away: tuple[float, float] = (0.0, 0.0),
+    *,
+    exposure: float = 0.0,
+    tone: str = "none",
 ) -> FloatArray:
     """Draw a PEM over its ray-traced background and write the picture.
 
@@ -40,6 +44,8 @@ def render(
         An .exr (scene-linear, float16) or a .png (clipped to [0,1] and sRGB-encoded, 8 bit).
     away
         Degrees of azimuth and elevation that the eye moves on from the point's place.
+    exposure, tone
+        Of a .png, as for `mirrorbake.tone.displayed`.
 
     Returns
     -------
@@ -50,14 +56,26 @@ def render(
     ------
     InputError
         The point is not of the space, or `out` has another suffix or cannot be written.
+    OptionError
+        The exposure or the tone mapping is none of `displayed`, or an .exr is to have one.
     """
     out = Path(out)
     if out.suffix.lower() not in PICTURE_SUFFIXES:
         raise InputError(f"{out}: expected a name that ends in {' or '.join(PICTURE_SUFFIXES)}")
+    check_picture_display(out, exposure, tone)
     check_writable(out)
     picture = picture_of(open_pem(Path(directory)), point, away)
-    _core.save_image(str(out), picture, ["R", "G", "B"])
+    _core.save_image(str(out), displayed(picture, exposure, tone), ["R", "G", "B"])
     return picture
+
+
+def check_picture_display(path: Path, exposure: float, tone: str) -> None:
+    """Raise OptionError for what `mirrorbake.tone.displayed` refuses, and for changes of an .exr."""
+    check_display(exposure, tone)
+    if path.suffix.lower() == ".exr" and (exposure != 0.0 or tone != "none"):
+        raise OptionError(
+            "exposure and tone-map: an .exr holds scene-linear radiance, expected neither, or .png"
+        )
 
 
 def picture_of(pem: OpenedPem, point: PointLike, away: tuple[float, float] = (0.0, 0.0)) -> FloatArray:

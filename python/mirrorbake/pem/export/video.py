@@ -11,7 +11,7 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.files import atomic_output, check_writable
-from mirrorbake.pem.render import picture_of
+from mirrorbake.pem.render import check_picture_display, picture_of
 from mirrorbake.tone import check_display, displayed, srgb_bytes
 
 if TYPE_CHECKING:
@@ -157,9 +157,7 @@ def export_stills(
     suffix = pattern.suffix.lower()
     if "{}" not in pattern.name or suffix not in (".png", ".exr"):
         raise InputError(f"{pattern}: expected a name with {{}} for the number that ends in .png or .exr")
-    check_display(exposure, tone)
-    if suffix == ".exr" and (exposure != 0.0 or tone != "none"):
-        raise OptionError("exposure and tone: an .exr holds scene-linear radiance, expected neither, or .png")
+    check_picture_display(pattern, exposure, tone)
     points = walk(pem.space, frames)
     paths = [pattern.with_name(pattern.name.replace("{}", f"{i:04d}")) for i in range(len(points))]
     check_writable(paths[0])

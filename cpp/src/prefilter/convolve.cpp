@@ -86,8 +86,10 @@ struct Convolver::State {
       moments[parts] = first_channel;
     }
     parallel_for(directions.size(), 16, [&](std::size_t begin, std::size_t end) {
+      std::vector<std::uint32_t> leaves;
       for (std::size_t i = begin; i < end; ++i) {
-        const std::array<double, 4> sums = tree.sum_cosines(glm::normalize(glm::dvec3(directions[i])));
+        const std::array<double, 4> sums =
+            tree.sum_cosines(glm::normalize(glm::dvec3(directions[i])), leaves);
         store(values, i, first_channel, sums.data(), 1, scale);
       }
     });
@@ -201,7 +203,7 @@ void Convolver::State::wide(const LobePlan& plan, std::span<const glm::vec3> dir
       const std::array<float, 3> center{static_cast<float>(middle.x), static_cast<float>(middle.y),
                                         static_cast<float>(middle.z)};
       list.clear();
-      grid.find(plan, cells, center.data(), radius + 1e-6, list);
+      grid.find(plan, cells, center.data(), static_cast<float>(radius) + 1e-6F, list);
       std::array<double, 4 * kOutputs> sums{};
       accumulate(grid.nodes(), list.data(), list.size(), x.data(), y.data(), z.data(), plan.terms,
                  sums.data());

@@ -125,9 +125,34 @@ void accumulate(const MomentNode* nodes, const std::uint32_t* list, std::size_t 
   }
 }
 
+// Leaves whose sums are taken in float, lane by lane, before they are added in double.
+constexpr std::size_t kLeavesInFloat = 16;
+
+void sum_cosines(const LightLeaf* leaves, const std::uint32_t* list, std::size_t count, const float* r,
+                 double* sums) {
+  for (std::size_t begin = 0; begin < count; begin += kLeavesInFloat) {
+    const std::size_t end = begin + kLeavesInFloat < count ? begin + kLeavesInFloat : count;
+    float part[4][kLeafTexels] = {};
+    for (std::size_t i = begin; i < end; ++i) {
+      const LightLeaf& leaf = leaves[list[i]];
+      for (std::size_t t = 0; t < kLeafTexels; ++t) {
+        const float along =
+            r[0] * leaf.direction[0][t] + r[1] * leaf.direction[1][t] + r[2] * leaf.direction[2][t];
+        const float cosine = along > 0.0F ? along : 0.0F;
+        for (std::size_t c = 0; c < 4; ++c) part[c][t] += cosine * leaf.light[c][t];
+      }
+    }
+    for (std::size_t c = 0; c < 4; ++c) {
+      for (std::size_t t = 0; t < kLeafTexels; ++t) sums[c] += static_cast<double>(part[c][t]);
+    }
+  }
+}
+
 }  // namespace
 
 extern const AccumulateLoop kAccumulate;
 const AccumulateLoop kAccumulate = &accumulate;
+extern const CosineLoop kCosines;
+const CosineLoop kCosines = &sum_cosines;
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

@@ -38,17 +38,35 @@ using AccumulateLoop = void (*)(const MomentNode* nodes, const std::uint32_t* li
 
 AccumulateLoop accumulate_loop();
 
+constexpr std::size_t kLeafTexels = 16;
+
+/// Texels as lights, read one after the other in loops. Those that do not exist have no light.
+struct LightLeaf {
+  float direction[3][kLeafTexels];
+  float light[4][kLeafTexels];  ///< Ω L in up to three channels, and Ω
+};
+
+/// sums[4] += Σ light · max(0, r·l) over the texels of the listed leaves.
+using CosineLoop = void (*)(const LightLeaf* leaves, const std::uint32_t* list, std::size_t count,
+                            const float* r, double* sums);
+
+CosineLoop cosine_loop();
+
 namespace baseline {
 extern const AccumulateLoop kAccumulate;
-}
+extern const CosineLoop kCosines;
+}  // namespace baseline
 namespace sse42 {
 extern const AccumulateLoop kAccumulate;
-}
+extern const CosineLoop kCosines;
+}  // namespace sse42
 namespace avx2 {
 extern const AccumulateLoop kAccumulate;
-}
+extern const CosineLoop kCosines;
+}  // namespace avx2
 namespace avx512 {
 extern const AccumulateLoop kAccumulate;
-}
+extern const CosineLoop kCosines;
+}  // namespace avx512
 
 }  // namespace mirrorbake

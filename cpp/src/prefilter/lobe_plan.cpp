@@ -129,4 +129,16 @@ AccumulateLoop accumulate_loop() {
   return baseline::kAccumulate;
 }
 
+CosineLoop cosine_loop() {
+#ifdef MIRRORBAKE_HAS_X86_LEVELS
+  switch (active_isa()) {
+    case Isa::avx512: return avx512::kCosines;
+    case Isa::avx2: return avx2::kCosines;
+    case Isa::sse42: return sse42::kCosines;
+    case Isa::baseline: break;
+  }
+#endif
+  return baseline::kCosines;
+}
+
 }  // namespace mirrorbake

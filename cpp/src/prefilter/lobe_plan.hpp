@@ -20,12 +20,11 @@ struct LobePlan {
   std::vector<float> table = {};
   LobeTerms terms = {};
 
-  double allowed_at(double chord) const {
-    const double position = chord * (0.5 * kSteps);
-    return static_cast<double>(
-        allowed[position > 0.0
-                    ? (position < kSteps ? static_cast<std::size_t>(position) : std::size_t{kSteps})
-                    : std::size_t{0}]);
+  float allowed_at(float chord) const {
+    const float position = chord * (0.5F * kSteps);
+    return allowed[position > 0.0F
+                       ? (position < static_cast<float>(kSteps) ? static_cast<std::size_t>(position) : kSteps)
+                       : std::size_t{0}];
   }
   double finest() const;
 };

@@ -9,6 +9,7 @@ namespace mirrorbake {
 namespace {
 
 constexpr int kSide = 4;
+static_assert(kSide * kSide == kLeafTexels);
 
 int divide_up(int value, int by) { return (value + by - 1) / by; }
 
@@ -92,10 +93,7 @@ TexelBlocks::TexelBlocks(const EnvMapLayout& layout, const SourceTexels& texels)
 
 void TexelBlocks::bound_leaf(std::size_t index) {
   Level& level = levels_[0];
-  const std::size_t line = index / to_size(level.width);
-  const Place place{0, static_cast<std::uint32_t>(line / to_size(level.height)),
-                    static_cast<std::uint32_t>(line % to_size(level.height)),
-                    static_cast<std::uint32_t>(index % to_size(level.width))};
+  const Place place = place_of(0, index);
   const Walk walk(*this);
   glm::dvec3 sum(0.0);
   int count = 0;
@@ -166,53 +164,49 @@ void TexelBlocks::find_near(const glm::dvec3& r, double chord, std::vector<std::
 void TexelBlocks::make_moments(const EnvMapView& map, int first_channel, const SourceTexels& texels) {
   const std::size_t channels = to_size(map.layout.channels);
   const std::size_t used = std::min<std::size_t>(3, channels - to_size(first_channel));
-  light_.assign(directions_.size(), {});
-  parallel_for(to_size(faces_) * to_size(height_), 8, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t line = begin; line < end; ++line) {
-      const int face = static_cast<int>(line / to_size(height_));
-      const int row = static_cast<int>(line % to_size(height_));
-      const float* values = map.values.data() + map.layout.index(0, face, row / texels.parts(), 0);
-      for (int column = 0; column < width_; ++column) {
+  leaves_.assign(levels_[0].blocks.size(), {});
+  levels_[0].moments.assign(leaves_.size(), {});
+  parallel_for(leaves_.size(), 128, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Place place = place_of(0, i);
+      LightLeaf& leaf = leaves_[i];
+      auto& moments = levels_[0].moments[i];
+      for (std::size_t t = 0; t < kLeafTexels; ++t) {
+        const int row = static_cast<int>(place.row) * kSide + static_cast<int>(t) / kSide;
+        const int column = static_cast<int>(place.column) * kSide + static_cast<int>(t) % kSide;
+        if (row >= height_ || column >= width_) continue;
         const double angle = texels.solid_angle(row, column);
-        std::array<float, 4>& light = light_[line * to_size(width_) + to_size(column)];
-        const float* texel = values + to_size(column / texels.parts()) * channels + to_size(first_channel);
-        for (std::size_t c = 0; c < used; ++c) {
-          light[c] = static_cast<float>(angle * static_cast<double>(texel[c]));
+        if (!(angle > 0.0)) continue;
+        const glm::dvec3 d = texels.direction(static_cast<int>(place.face), row, column);
+        const float* texel =
+            map.values.data() + to_size(first_channel) +
+            map.layout.index(0, static_cast<int>(place.face), row / texels.parts(), column / texels.parts());
+        std::array<double, 4> light{0.0, 0.0, 0.0, angle};
+        for (std::size_t c = 0; c < used; ++c) light[c] = angle * static_cast<double>(texel[c]);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          leaf.direction[axis][t] = static_cast<float>(d[static_cast<int>(axis)]);
+          for (std::size_t c = 0; c < 4; ++c) moments[axis][c] += light[c] * d[static_cast<int>(axis)];
         }
-        light[3] = static_cast<float>(angle);
+        for (std::size_t c = 0; c < 4; ++c) leaf.light[c][t] = static_cast<float>(light[c]);
       }
     }
   });
-  for (std::uint32_t number = 0; number < levels_.size(); ++number) {
+  for (std::uint32_t number = 1; number < levels_.size(); ++number) {
     Level& level = levels_[number];
+    const Level& finer = levels_[number - 1];
     level.moments.assign(level.blocks.size(), {});
     parallel_for(level.blocks.size(), 512, [&](std::size_t begin, std::size_t end) {
-      const Walk walk(*this);
       for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t line = i / to_size(level.width);
-        const std::uint32_t face = static_cast<std::uint32_t>(line / to_size(level.height));
-        const std::uint32_t row = static_cast<std::uint32_t>(line % to_size(level.height));
-        const std::uint32_t column = static_cast<std::uint32_t>(i % to_size(level.width));
-        auto& moments = level.moments[i];
-        if (number == 0) {
-          walk.texels({0, face, row, column}, [&](std::size_t t) {
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-              const double d = static_cast<double>(directions_[t][static_cast<int>(axis)]);
-              for (std::size_t c = 0; c < 4; ++c) moments[axis][c] += static_cast<double>(light_[t][c]) * d;
-            }
-          });
-          continue;
-        }
-        const Level& finer = levels_[number - 1];
+        const Place place = place_of(number, i);
         for (std::uint32_t k = 0; k < 4; ++k) {
-          const Place child{number - 1, face, 2 * row + k / 2, 2 * column + k % 2};
+          const Place child{number - 1, place.face, 2 * place.row + k / 2, 2 * place.column + k % 2};
           if (child.row >= static_cast<std::uint32_t>(finer.height) ||
               child.column >= static_cast<std::uint32_t>(finer.width)) {
             continue;
           }
           const auto& part = finer.moments[block_index(child)];
           for (std::size_t axis = 0; axis < 3; ++axis) {
-            for (std::size_t c = 0; c < 4; ++c) moments[axis][c] += part[axis][c];
+            for (std::size_t c = 0; c < 4; ++c) level.moments[i][axis][c] += part[axis][c];
           }
         }
       }
@@ -220,8 +214,10 @@ void TexelBlocks::make_moments(const EnvMapView& map, int first_channel, const S
   }
 }
 
-std::array<double, 4> TexelBlocks::sum_cosines(const glm::dvec3& r) const {
-  std::array<double, 4> sums{};
+std::array<double, 4> TexelBlocks::sum_cosines(const glm::dvec3& r,
+                                               std::vector<std::uint32_t>& leaves) const {
+  std::array<std::array<double, 4>, 3> moments{};
+  leaves.clear();
   Walk walk(*this);
   Place place{};
   while (walk.next(place)) {
@@ -233,17 +229,23 @@ std::array<double, 4> TexelBlocks::sum_cosines(const glm::dvec3& r) const {
     const double reach = static_cast<double>(block.reach);
     if (depth <= -reach) continue;
     if (depth >= reach) {
-      const auto& m = level.moments[index];
-      for (std::size_t c = 0; c < 4; ++c) sums[c] += r.x * m[0][c] + r.y * m[1][c] + r.z * m[2][c];
+      const auto& part = level.moments[index];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (std::size_t c = 0; c < 4; ++c) moments[axis][c] += part[axis][c];
+      }
     } else if (place.level > 0) {
       walk.enter(place);
     } else {
-      walk.texels(place, [&](std::size_t t) {
-        const double cosine = std::max(0.0, glm::dot(r, glm::dvec3(directions_[t])));
-        for (std::size_t c = 0; c < 4; ++c) sums[c] += cosine * static_cast<double>(light_[t][c]);
-      });
+      leaves.push_back(static_cast<std::uint32_t>(index));
     }
   }
+  std::array<double, 4> sums{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t c = 0; c < 4; ++c) sums[c] += r[static_cast<int>(axis)] * moments[axis][c];
+  }
+  const std::array<float, 3> toward{static_cast<float>(r.x), static_cast<float>(r.y),
+                                    static_cast<float>(r.z)};
+  cosine_loop()(leaves_.data(), leaves.data(), leaves.size(), toward.data(), sums.data());
   return sums;
 }
 

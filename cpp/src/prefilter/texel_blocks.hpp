@@ -8,6 +8,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "lobe_kernels.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 #include "source_texels.hpp"
 
@@ -29,7 +30,8 @@ class TexelBlocks {
 
   /// Σ Ω L max(0, r·l) over all texels, and Σ Ω max(0, r·l) in the fourth place. Of blocks before the great
   /// circle about r only the first moment counts, those behind it do not; along it every texel is looked at.
-  std::array<double, 4> sum_cosines(const glm::dvec3& r) const;
+  /// `leaves` is working memory.
+  std::array<double, 4> sum_cosines(const glm::dvec3& r, std::vector<std::uint32_t>& leaves) const;
 
   const glm::vec3& direction(std::size_t texel) const { return directions_[texel]; }
 
@@ -58,6 +60,13 @@ class TexelBlocks {
                static_cast<std::size_t>(level.width) +
            p.column;
   }
+  Place place_of(std::uint32_t number, std::size_t index) const {
+    const Level& level = levels_[number];
+    const std::size_t line = index / static_cast<std::size_t>(level.width);
+    return {number, static_cast<std::uint32_t>(line / static_cast<std::size_t>(level.height)),
+            static_cast<std::uint32_t>(line % static_cast<std::size_t>(level.height)),
+            static_cast<std::uint32_t>(index % static_cast<std::size_t>(level.width))};
+  }
   void bound_leaf(std::size_t index);
   void bound_parent(std::size_t level, std::size_t index);
 
@@ -65,8 +74,8 @@ class TexelBlocks {
   int width_;  ///< of a face, in texels
   int height_;
   std::vector<glm::vec3> directions_;
-  std::vector<std::array<float, 4>> light_;  ///< Ω L and Ω
-  std::vector<Level> levels_;                ///< of 4 × 4 texels first
+  std::vector<LightLeaf> leaves_;  ///< of the blocks of the first level
+  std::vector<Level> levels_;      ///< of 4 × 4 texels first
 };
 
 }  // namespace mirrorbake

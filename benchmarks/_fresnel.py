@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks._mitsuba import mitsuba
 from benchmarks._report import Case, require, seconds, seconds_in_turn
 from mirrorbake import _core, fresnel
 
@@ -61,28 +59,6 @@ def numpy_table(values: Any, c: Any) -> Any:
     i = np.minimum(x.astype(np.int32), len(values) - 2)
     low = values[i]
     return low + (x - i.astype(np.float32)) * (values[i + 1] - low)
-
-
-def mitsuba() -> Any:
-    """Mitsuba with its LLVM backend, or None with a message if there is no LLVM it can use (17 or newer)."""
-    if "DRJIT_LIBLLVM_PATH" not in os.environ:
-        libraries = sorted(
-            path
-            for folder in Path("/usr/lib").glob("*-linux-gnu")
-            for version in (17, 18, 19, 20, 21)
-            for path in (*folder.glob(f"libLLVM.so.{version}*"), *folder.glob(f"libLLVM-{version}.so"))
-        )
-        if libraries:
-            os.environ["DRJIT_LIBLLVM_PATH"] = str(libraries[-1])
-    try:
-        import mitsuba as module
-
-        module.set_variant("llvm_ad_rgb")
-        module.Float([1.0]) + 1
-    except Exception as error:
-        print(f"bench: without Mitsuba ({error}); on Debian it needs libllvm19", file=sys.stderr)
-        return None
-    return module
 
 
 def mitsuba_kernels(mi: Any, values: Any) -> dict[str, Callable[[Any], Any]]:
@@ -146,7 +122,7 @@ def cases() -> Iterator[Case]:
         "F3 conductor": numpy_conductor,
         "F4 table": partial(numpy_table, values),
     }
-    mi = mitsuba()
+    mi = mitsuba("llvm_ad_rgb")
     in_mitsuba = mitsuba_kernels(mi, values) if mi is not None else {}
     for count in COUNTS:
         # Shuffled, as pixels are: neighbouring cosines are not neighbours in a table.

@@ -1,4 +1,4 @@
-"""Path-traced images against Mitsuba 3's `scalar_rgb` and, where it has LLVM, `llvm_ad_rgb`.
+"""Path-traced images against Mitsuba 3's `scalar_rgb` and, where there is an LLVM for it, `llvm_ad_rgb`.
 
 Two scenes, paths of any length: a box room with a rectangle light and a mirror ball of 9,000 triangles, which
 throws caustics, and a matte teapot under a sky with a sun, which does not.
@@ -15,10 +15,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import mitsuba as mi
 import numpy as np
 
 from benchmarks import rays
+from benchmarks._mitsuba import mitsuba
 from benchmarks._report import Case, require, run, seconds
 from mirrorbake import _core as core
 
@@ -75,7 +75,7 @@ def our_scene(ball: core.TriangleMesh) -> core.Scene:
     return scene
 
 
-def mitsuba_sensor(eye: Point, target: Point) -> dict[str, Any]:
+def mitsuba_sensor(mi: Any, eye: Point, target: Point) -> dict[str, Any]:
     return {
         "type": "perspective",
         "to_world": mi.ScalarTransform4f().look_at(origin=eye, target=target, up=[0, 1, 0]),
@@ -93,7 +93,7 @@ def matte(shape: dict[str, Any], albedo: Point) -> dict[str, Any]:
     return shape | {"bsdf": bsdf}
 
 
-def mitsuba_room(ball: core.TriangleMesh, folder: Path) -> dict[str, Any]:
+def mitsuba_room(ball: core.TriangleMesh, mi: Any, folder: Path) -> dict[str, Any]:
     scene: dict[str, Any] = {"type": "scene", "integrator": {"type": "path", "max_depth": -1}}
     for i, (corner, u, v, albedo) in enumerate(WALLS):
         mesh = core.make_rectangle(corner, u, v)
@@ -104,7 +104,7 @@ def mitsuba_room(ball: core.TriangleMesh, folder: Path) -> dict[str, Any]:
     }
     mirror = {"type": "conductor", "material": "none", "specular_reflectance": rgb(MIRROR)}
     scene["ball"] = write_ply(folder / "ball.ply", ball) | {"bsdf": {"type": "twosided", "nested": mirror}}
-    scene["sensor"] = mitsuba_sensor(EYE, TARGET)
+    scene["sensor"] = mitsuba_sensor(mi, EYE, TARGET)
     return scene
 
 
@@ -139,19 +139,19 @@ def our_outdoors() -> core.Scene:
     return scene
 
 
-def mitsuba_outdoors(folder: Path) -> dict[str, Any]:
+def mitsuba_outdoors(mi: Any, folder: Path) -> dict[str, Any]:
     scene: dict[str, Any] = {"type": "scene", "integrator": {"type": "path", "max_depth": -1}}
     for i, (mesh, albedo) in enumerate(zip(outdoor_meshes(), OUTDOORS, strict=True)):
         scene[f"matte{i}"] = matte(write_ply(folder / f"matte{i}.ply", mesh), albedo)
     # Mitsuba's panorama has +Z at its centre.
     turned = np.roll(sky(), 128, axis=1)
     scene["sky"] = {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(turned))}
-    scene["sensor"] = mitsuba_sensor(*OUTDOOR_VIEW)
+    scene["sensor"] = mitsuba_sensor(mi, *OUTDOOR_VIEW)
     return scene
 
 
 def contest(
-    name: str, scene: core.Scene, view: tuple[Point, Point], peer_scene: Callable[[Path], dict[str, Any]]
+    name: str, scene: core.Scene, view: tuple[Point, Point], peer_scene: Callable[[Any, Path], dict[str, Any]]
 ) -> Iterator[Case]:
     start = time.perf_counter()
     tracer = core.Tracer(scene, core.TracerOptions(indirect="path"))
@@ -167,9 +167,6 @@ def contest(
     # Fireflies, of Mitsuba's caustics above all, would decide alone: the worst 1 % of pixels are left out.
     reference = np.mean([ours(1000 + i) for i in range(REFERENCE_SEEDS)], axis=0)
 
-    def peers(scene: Any) -> Any:
-        return np.array(mi.render(scene, spp=SAMPLES, seed=1))
-
     def error(image: Any) -> float:
         square = ((image - reference) / np.maximum(reference, 0.01)) ** 2
         return float(np.sqrt(np.sort(square, axis=None)[: int(0.99 * square.size)].mean()))
@@ -178,18 +175,21 @@ def contest(
     our_error = error(our_image)
     our_time = seconds(lambda: ours(1), 5)
     for variant in ("scalar_rgb", "llvm_ad_rgb"):
-        try:
-            mi.set_variant(variant)
-            with tempfile.TemporaryDirectory() as folder:
-                loaded = mi.load_dict(peer_scene(Path(folder)))
-            image = peers(loaded)
-        except (ImportError, RuntimeError):
-            continue  # no LLVM on this machine
+        mi = mitsuba(variant)
+        if mi is None:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            loaded = mi.load_dict(peer_scene(mi, Path(folder)))
+
+        def peers(mi: Any = mi, loaded: Any = loaded) -> Any:
+            return np.array(mi.render(loaded, spp=SAMPLES, seed=1))
+
+        image = peers()
         # Not the median: fireflies lift the mean of a pixel above what most of its estimates are.
         bias = abs(float(image.mean() / our_image.mean()) - 1)
         require(bias < 0.02, f"the mean is {bias:.1%} off")
         peer_error = error(image)
-        peer_time = seconds(partial(peers, loaded), 5)
+        peer_time = seconds(peers, 5)
         yield Case(
             case=f"{name}, {SIZE}² pixels, time to our error at {SAMPLES} samples; ready in {ready:.2f} s",
             unit="s per image",

@@ -8,10 +8,10 @@
 #include <optional>
 #include <string>
 
+#include "command.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
-#include "tool.hpp"
 
 /// What the commands of mb-envmap have in common.
 namespace mirrorbake::tool {
@@ -100,21 +100,14 @@ inline Size parse_size(const std::string& text, const Projection& projection) {
   throw InvalidArgument("--size", text, "HEIGHT or WIDTHxHEIGHT in texels of a face");
 }
 
-/// A command with a file of its own: it adds itself to the program and runs if it was asked for.
-class EnvmapCommand {
- public:
-  explicit EnvmapCommand(CLI::App* app) : app_(app) {}
-  EnvmapCommand(const EnvmapCommand&) = delete;
-  EnvmapCommand& operator=(const EnvmapCommand&) = delete;
-  virtual ~EnvmapCommand() = default;
-  bool wanted() const { return app_->parsed(); }
-  virtual void run(bool json) const = 0;
-
- private:
-  CLI::App* app_;
-};
-
-std::unique_ptr<EnvmapCommand> add_prefilter(CLI::App& app);
-std::unique_ptr<EnvmapCommand> add_preview(CLI::App& app);
+std::unique_ptr<Command> add_info(CLI::App& app);
+std::unique_ptr<Command> add_convert(CLI::App& app);
+std::unique_ptr<Command> add_rotate(CLI::App& app);
+std::unique_ptr<Command> add_mips(CLI::App& app);
+std::unique_ptr<Command> add_border(CLI::App& app);
+std::unique_ptr<Command> add_sample(CLI::App& app);
+std::unique_ptr<Command> add_compare(CLI::App& app);
+std::unique_ptr<Command> add_prefilter(CLI::App& app);
+std::unique_ptr<Command> add_preview(CLI::App& app);
 
 }  // namespace mirrorbake::tool

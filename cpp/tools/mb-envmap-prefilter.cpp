@@ -82,9 +82,9 @@ EnvMap harmonics_as_image(const Harmonics& light, std::span<const std::string> n
   return row;
 }
 
-class Prefilter final : public EnvmapCommand {
+class Prefilter final : public Command {
  public:
-  explicit Prefilter(CLI::App* app) : EnvmapCommand(app) {
+  explicit Prefilter(CLI::App* app) : Command(app) {
     input_.add_options(*app);
     input_.add_details(*app);
     output_.add_options(*app);
@@ -244,7 +244,7 @@ class Prefilter final : public EnvmapCommand {
 
 }  // namespace
 
-std::unique_ptr<EnvmapCommand> add_prefilter(CLI::App& app) {
+std::unique_ptr<Command> add_prefilter(CLI::App& app) {
   return std::make_unique<Prefilter>(app.add_subcommand(
       "prefilter", "Maps of diffuse and glossy reflection, and light as spherical harmonics"));
 }

@@ -29,9 +29,9 @@ glm::vec3 neutral(glm::vec3 color) {
   return glm::mix(color * (new_peak / peak), glm::vec3(new_peak), fade);
 }
 
-class Preview final : public EnvmapCommand {
+class Preview final : public Command {
  public:
-  explicit Preview(CLI::App* app) : EnvmapCommand(app) {
+  explicit Preview(CLI::App* app) : Command(app) {
     input_.add_options(*app);
     input_.add_details(*app);
     output_.add_options(*app);
@@ -83,7 +83,7 @@ class Preview final : public EnvmapCommand {
 
 }  // namespace
 
-std::unique_ptr<EnvmapCommand> add_preview(CLI::App& app) {
+std::unique_ptr<Command> add_preview(CLI::App& app) {
   return std::make_unique<Preview>(app.add_subcommand("preview", "A tone-mapped picture of a map"));
 }
 

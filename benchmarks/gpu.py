@@ -51,15 +51,9 @@ void main() {
   vec3 d = texelFetch(uD, at, 0).xyz;
   Taps taps = tapsOf(d, texelFetch(uDdx, at, 0).xyz, texelFetch(uDdy, at, 0).xyz, uSize);
   vec3 sum = vec3(0.0);
-  for (int tap = 0; tap < max(2 * taps.pairs, 1); ++tap) {
-    float weight = 1.0;
-    vec3 place = d;
-    if (taps.pairs > 0) {
-      int pair = tap >> 1;
-      float offset = (float(pair) + 0.5) * taps.step;
-      place += ((tap & 1) == 0 ? offset : -offset) * taps.longer;
-      weight = (pair + 1 < taps.pairs ? 1.0 : 0.5 * (taps.n - 2.0 * float(taps.pairs - 1))) / taps.n;
-    }
+  for (int tap = 0; tap < tapCount(taps); ++tap) {
+    float weight;
+    vec3 place = tapDirection(taps, d, tap, weight);
     sum += weight * readRadiance(place, taps.level, uSize, 0.0);
   }
   oColour = vec4(sum, 1.0);

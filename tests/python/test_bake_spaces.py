@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import os
 import signal
 import subprocess
@@ -17,8 +18,10 @@ from mirrorbake import _core
 from mirrorbake.bake.bake import bake
 from mirrorbake.errors import InputError, OptionError, StoreError
 from mirrorbake.evaluate.metrics import psnr
+from mirrorbake.pem.export.images import ImageFormat
 from mirrorbake.pem.export.map_sets import sample_set, static_set
 from mirrorbake.pem.export.source import export_source
+from mirrorbake.pem.export.web import WebPem
 from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.render import render
 from mirrorbake.pem.store import PemStore
@@ -287,7 +290,7 @@ def test_maps_are_fitted_to_the_display_in_every_kind_of_scene(name: str, tmp_pa
     assert verify(tmp_path / "pem").is_sound
 
 
-def test_exports_refuse_maps_that_are_no_cubes_by_the_name_of_the_key(tmp_path: Path) -> None:
+def test_exports_of_cubes_refuse_paraboloids_by_the_name_of_the_key(tmp_path: Path) -> None:
     config = scene(
         tmp_path,
         {"count": 1},
@@ -295,13 +298,15 @@ def test_exports_refuse_maps_that_are_no_cubes_by_the_name_of_the_key(tmp_path: 
     )
     bake(config, tmp_path / "pem")
     pem = open_pem(tmp_path / "pem")
-    for export in (
-        lambda: export_source(pem),
-        lambda: static_set(pem.store),
-        lambda: sample_set(pem.store, 0),
-    ):
-        with pytest.raises(InputError, match=r'maps\.projection = "paraboloid"'):
-            export()
+    with pytest.raises(InputError, match=r'maps\.projection = "paraboloid"'):
+        static_set(pem.store)
+    with pytest.raises(InputError, match=r'maps\.projection = "paraboloid"'):
+        sample_set(pem.store, 0)
+    # The page draws them.
+    web = WebPem(export_source(pem))
+    assert json.loads(web.read("manifest.json"))["projection"] == "paraboloid"
+    atlas = ImageFormat(exact=False).decode(web.read("samples/00000/0.avif"))
+    assert atlas.shape == (8 + 4, 16, 3)
 
 
 NEAR = {"count": 3, "degrees": 4.0, "start": 20}

@@ -12,6 +12,7 @@ from mirrorbake.pem.export.images import ImageFormat, probe_image
 from mirrorbake.pem.export.mesh_file import ReflectorMesh, octahedral, write_mesh
 from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_atlas, level_place, to_atlas
 from mirrorbake.pem.export.web import WebOptions, WebPem
+from mirrorbake.pem.pyramid import FACES, Projection
 from viewer_cases import Case, CasePem, Scene, case_scene, case_source, cases, irradiance
 
 
@@ -46,21 +47,26 @@ def test_maps_that_are_black_have_a_code(bright: float) -> None:
     assert np.isfinite(code.table()).all()
 
 
+PROJECTIONS: tuple[Projection, ...] = ("cube", "paraboloid")
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS)
 @pytest.mark.parametrize("size", [1, 2, 8, 64])
-def test_an_atlas_holds_every_texel_of_every_level_once(size: int) -> None:
-    texels = sum(6 * (size >> level) ** 2 for level in range(size.bit_length()))
+def test_an_atlas_holds_every_texel_of_every_level_once(size: int, projection: Projection) -> None:
+    texels = sum(FACES[projection] * (size >> level) ** 2 for level in range(size.bit_length()))
     pyramid = np.random.default_rng(1).integers(0, 256, (texels, 3), np.uint8)
-    atlas = to_atlas(pyramid, size)
-    assert atlas.shape == (*atlas_shape(size), 3)
-    assert np.array_equal(from_atlas(atlas, size), pyramid)
+    atlas = to_atlas(pyramid, size, projection)
+    assert atlas.shape == (*atlas_shape(size, projection), 3)
+    assert np.array_equal(from_atlas(atlas, size, projection), pyramid)
 
 
-def test_levels_of_an_atlas_do_not_overlap() -> None:
+@pytest.mark.parametrize(("projection", "rows", "columns"), [("cube", 2, 3), ("paraboloid", 1, 2)])
+def test_levels_of_an_atlas_do_not_overlap(projection: Projection, rows: int, columns: int) -> None:
     size = 32
-    taken = np.zeros(atlas_shape(size), int)
+    taken = np.zeros(atlas_shape(size, projection), int)
     for level in range(size.bit_length()):
-        row, column = level_place(size, level)
-        taken[row : row + 2 * (size >> level), column : column + 3 * (size >> level)] += 1
+        row, column = level_place(size, level, projection)
+        taken[row : row + rows * (size >> level), column : column + columns * (size >> level)] += 1
     assert taken.max() == 1
 
 
@@ -228,17 +234,20 @@ def test_vertices_that_no_triangle_uses_are_left_out() -> None:
     assert "normals" not in layout["arrays"]
 
 
-def test_the_manifest_names_every_file_and_no_other(scene: Scene) -> None:
-    web = WebPem(case_source(cases()[0], scene, CasePem()), WebOptions())
+@pytest.mark.parametrize("name", ["infinite", "shells", "fading", "box-paraboloid"])
+def test_the_manifest_names_every_file_and_no_other(name: str, scene: Scene) -> None:
+    case = next(case for case in cases() if case.name == name)
+    web = WebPem(case_source(case, scene, CasePem(case.projection)), WebOptions())
     manifest = json.loads(web.read("manifest.json"))
     suffix = manifest["images"]["suffix"]
     images = [manifest["static"]["image"]]
+    for files in manifest["static"]["maps"] or ():
+        images += [name for name in files.values() if name is not None]
     for sample in manifest["samples"]:
         images.append(sample["still"])
         assert sample["irradiance"] is None
-        for part in sample["maps"]:
-            for files in part:
-                images += [name for name in files.values() if name is not None]
+        for files in sample["maps"]:
+            images += [name for name in files.values() if name is not None]
     expected = {
         "manifest.json",
         manifest["mesh"]["file"],
@@ -248,9 +257,9 @@ def test_the_manifest_names_every_file_and_no_other(scene: Scene) -> None:
     expected |= {name + suffix for name in images} | {f"exact/{name}.webp" for name in images}
     assert set(web.names) == expected
     assert web.names[0] == "manifest.json"
-    first = manifest["samples"][manifest["first"]]["maps"][0][0]["radiance"]
+    first = manifest["samples"][manifest["first"]]["maps"][0]["radiance"]
     assert web.names.index(first + suffix) < min(
-        web.names.index(sample["maps"][0][0]["radiance"] + suffix)
+        web.names.index(sample["maps"][0]["radiance"] + suffix)
         for i, sample in enumerate(manifest["samples"])
         if i != manifest["first"]
     )
@@ -260,9 +269,9 @@ def test_an_exact_image_of_a_map_holds_its_codes(scene: Scene) -> None:
     pem = CasePem()
     web = WebPem(case_source(cases()[0], scene, pem), WebOptions(ImageFormat(exact=True)))
     code = RadianceCode(**json.loads(web.read("manifest.json"))["radiance"])
-    pyramid = pem.pyramid(1, 0, 0)
+    pyramid = pem.pyramid(1, 0)
     form = ImageFormat(exact=True)
-    atlas = form.decode(web.read("samples/00001/0.0.webp"))
+    atlas = form.decode(web.read("samples/00001/0.webp"))
     assert np.array_equal(from_atlas(atlas, 32), code.encode(pyramid[:, :3]))
-    alpha = form.decode(web.read("samples/00001/0.0.alpha.webp"))
+    alpha = form.decode(web.read("samples/00001/0.alpha.webp"))
     assert np.array_equal(from_atlas(alpha, 32)[:, 0], np.rint(pyramid[:, 3] * 255.0))

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,8 +23,10 @@ from mirrorbake.pem.export.images import ImageFormat
 from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
 from mirrorbake.pem.export.radiance_code import RadianceCode
-from mirrorbake.pem.export.source import ExportSource, Part, Shell, run_time_attributes
+from mirrorbake.pem.export.source import ExportSource, MapEntry, Part, Shell, run_time_attributes
 from mirrorbake.pem.export.web import WebOptions, WebPem
+from mirrorbake.pem.pyramid import FACES, Projection, topology_of
+from mirrorbake.pem.run_time import fade_weight
 from mirrorbake.pem.shells import moved_proxy
 from mirrorbake.proxy import proxy_from_attributes, proxy_to_attributes
 from mirrorbake.scene.parameters import Axis, ParameterSpace
@@ -55,11 +57,28 @@ class Case:
     """Textures of albedo, reflectance and normals, and coloured vertices."""
     moves: bool = False
     """The object moves and turns, with its local shell; the diffuse layer changes on the way."""
+    between: _core.Proxy | None = None
+    """Of a third shell of the ring, behind the local one. The ball then reads the ring's distant map."""
+    fade_degrees: float | None = None
+    """There is a static set, to which the PEM fades."""
+    projection: Projection = "cube"
     run_time: _core.RunTimeModel = field(default_factory=lambda: _core.run_time_model("Web"))
 
 
+MAPS = (4, 3, 3, 4)
+"""Channels of the maps: the ring's local and distant ones, the ball's, and that of a shell between."""
+
+
 def cases() -> list[Case]:
-    """Every proxy as the distant shell's, every model of reflectance."""
+    """Every proxy as the distant shell's in both projections, every model of reflectance."""
+    cubes = _cube_cases()
+    on_paraboloids = [
+        replace(case, name=f"{case.name}-paraboloid", projection="paraboloid") for case in cubes[:6]
+    ]
+    return [*cubes, *on_paraboloids]
+
+
+def _cube_cases() -> list[Case]:
     origin = (0.02, 0.1, -0.03)
     local = _core.Proxy.ellipsoid(
         (0.0, 0.1, 0.0), (0.2, 0.12, 0.2), (0.0, 0.1, 0.0), np.eye(3, dtype=np.float32)
@@ -111,6 +130,14 @@ def cases() -> list[Case]:
             schlick,
             moves=True,
         ),
+        Case(
+            "shells",
+            _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, straight),
+            local,
+            schlick,
+            between=_core.Proxy.ellipsoid((0, 0.1, 0), (0.5, 0.3, 0.4), origin, turned),
+        ),
+        Case("fading", _core.Proxy.infinite(origin), local, schlick, fade_degrees=10.0),
     ]
 
 
@@ -139,7 +166,7 @@ def _bumps() -> FloatArray:
     return (0.5 + 0.5 * lean).astype(np.float32)
 
 
-def _maps(seed: int, channels: int) -> FloatArray:
+def _maps(seed: int, channels: int, projection: Projection = "cube") -> FloatArray:
     """A pyramid of smooth colours with some noise on every level of its own: wrong levels are seen."""
     random = np.random.default_rng(seed)
     levels = []
@@ -147,7 +174,7 @@ def _maps(seed: int, channels: int) -> FloatArray:
     for level in range(MAP_SIZE.bit_length()):
         n = MAP_SIZE >> level
         centres = (np.arange(n) + 0.5) / n
-        faces = np.arange(6)
+        faces = np.arange(FACES[projection])
         f, t, s = np.meshgrid(faces, centres, centres, indexing="ij")
         for_all = [
             0.5
@@ -244,8 +271,8 @@ def irradiance(case: Case, normals: FloatArray, sample: int) -> FloatArray:
     return values
 
 
-def _eye(t: float) -> tuple[float, float, float]:
-    azimuth, elevation = math.radians(t * ARC_DEGREES), math.radians(ELEVATION)
+def _eye(t: float, raised: float) -> tuple[float, float, float]:
+    azimuth, elevation = math.radians(t * ARC_DEGREES), math.radians(ELEVATION + raised)
     flat = DISTANCE * math.cos(elevation)
     return flat * math.sin(azimuth), 0.1 + DISTANCE * math.sin(elevation), flat * math.cos(azimuth)
 
@@ -253,18 +280,24 @@ def _eye(t: float) -> tuple[float, float, float]:
 class CasePem:
     """The maps of a case as the page gets them: rounded to codes."""
 
-    def __init__(self) -> None:
+    def __init__(self, projection: Projection = "cube") -> None:
+        self.projection = projection
         self.code = RadianceCode.for_range(2.0, 3.6)
-        self._maps: dict[tuple[int, int, int], FloatArray] = {}
-        for sample in range(len(PARAMETERS)):
-            for part, shell, channels in ((0, 0, 4), (0, 1, 3), (1, 0, 3)):
-                self._maps[sample, part, shell] = _maps(97 * sample + 13 * part + shell, channels)
+        # The last "sample" is the static set.
+        self._maps = [
+            [_maps(97 * sample + 13 * m, channels, projection) for m, channels in enumerate(MAPS)]
+            for sample in range(len(PARAMETERS) + 1)
+        ]
 
-    def pyramid(self, sample: int, part: int, shell: int) -> FloatArray:
-        return self._maps[sample, part, shell]
+    @property
+    def static_maps(self) -> list[FloatArray]:
+        return self._maps[-1]
 
-    def rounded(self, code: RadianceCode, sample: int, part: int, shell: int) -> FloatArray:
-        pyramid = self._maps[sample, part, shell].copy()
+    def pyramid(self, sample: int, number: int) -> FloatArray:
+        return self._maps[sample][number]
+
+    def rounded(self, code: RadianceCode, sample: int, number: int) -> FloatArray:
+        pyramid = self._maps[sample][number].copy()
         pyramid[:, :3] = code.decode(code.encode(pyramid[:, :3]))
         if pyramid.shape[1] == 4:
             pyramid[:, 3] = np.rint(pyramid[:, 3] * 255.0) / 255.0
@@ -274,26 +307,28 @@ class CasePem:
 def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
     """The case as an exporter sees it."""
     local, distant = proxy_to_attributes(case.local), proxy_to_attributes(case.distant)
+    ring = [Shell("local", local, 0, moves=case.moves, on_hull=False), Shell("distant", distant, 1)]
+    if case.between is not None:
+        ring.insert(1, Shell("between", proxy_to_attributes(case.between), 3))
     parts = (
-        Part(
-            "ring",
-            (
-                Shell("local", local, MAP_SIZE, opaque=False, moves=case.moves),
-                Shell("distant", distant, MAP_SIZE, opaque=True),
-            ),
-        ),
-        Part("ball", (Shell("distant", distant, MAP_SIZE, opaque=True),)),
+        Part("ring", tuple(ring)),
+        Part("ball", (Shell("distant", distant, 2 if case.between is None else 1),)),
     )
+    count = len(MAPS) if case.between is not None else len(MAPS) - 1
     return ExportSource(
         parts=parts,
         space=ParameterSpace((Axis("motion" if case.moves else "arc", PARAMETERS, 0.0, 1.0),)),
         motion=MOTION if case.moves else None,
+        projection=case.projection,
+        maps=tuple(MapEntry(f"map {m}", MAP_SIZE, opaque=MAPS[m] == 3) for m in range(count)),
         pyramid=pem.pyramid,
+        static_maps=None if case.fade_degrees is None else tuple(pem.static_maps[:count]),
+        fade_degrees=case.fade_degrees,
         still=lambda sample: np.full((HEIGHT, WIDTH, 3), 0.2 + 0.2 * sample, np.float32),
         mesh=scene.mesh,
         materials=scene.materials,
         irradiance=(lambda sample: irradiance(case, scene.mesh.normals, sample)) if case.moves else None,
-        static=_maps(1234, 3),
+        static=_maps(1234, 3, case.projection),
         static_proxy=distant,
         static_size=MAP_SIZE,
         camera={
@@ -303,6 +338,8 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
             "height": DISTANCE * math.sin(math.radians(ELEVATION)),
             "startDegrees": 0.0,
             "degrees": 0.0 if case.moves else ARC_DEGREES,
+            "azimuths": [0.0, 0.0 if case.moves else ARC_DEGREES],
+            "elevations": [ELEVATION, ELEVATION],
             "verticalFovDegrees": FOV,
             "aspect": WIDTH / HEIGHT,
             "pixels": HEIGHT,
@@ -313,31 +350,35 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
     )
 
 
-def reference(case: Case, pem: CasePem, code: RadianceCode, t: float) -> FloatArray:
-    """The C++ renderer's picture at a parameter, (H, W, 4)."""
+def reference(case: Case, pem: CasePem, code: RadianceCode, t: float, raised: float) -> FloatArray:
+    """The C++ renderer's picture at a parameter, `raised` degrees above the samples, (H, W, 4)."""
     scene, pose = case_scene(case, t), _pose(case, t)
-    eye = _eye(0.0 if case.moves else t)
+    eye = _eye(0.0 if case.moves else t, raised)
     camera = _core.Camera(eye, (0.0, 0.1, 0.0), vertical_fov_degrees=FOV, width=WIDTH, height=HEIGHT)
     samples = scene.tracer.trace_visibility(camera, 0, places=case.run_time.places)
     place = t * (len(PARAMETERS) - 1)
     first = min(int(place), len(PARAMETERS) - 2)
     weight = np.float32(place - first)
 
-    def blended(part: int, shell: int) -> FloatArray:
-        a = pem.rounded(code, first, part, shell)
-        b = pem.rounded(code, first + 1, part, shell)
-        return (1 - weight) * a + weight * b
+    fade = np.float32(1.0 if case.fade_degrees is None else fade_weight(case.fade_degrees, raised))
+
+    def blended(number: int) -> FloatArray:
+        a = pem.rounded(code, first, number)
+        b = pem.rounded(code, first + 1, number)
+        static = pem.rounded(code, len(PARAMETERS), number)
+        return fade * ((1 - weight) * a + weight * b) + (1 - fade) * static
 
     local = proxy_from_attributes(moved_proxy(proxy_to_attributes(case.local), pose))
-    layout = _core.CubePyramidLayout(MAP_SIZE)
+    layout = topology_of(case.projection, MAP_SIZE)
     stacked = scene.mesh.whole_stack.astype(np.uint8)
+    distant = _core.ShellMap(case.distant, layout, blended(1))
     parts = [
-        [
-            _core.ShellMap(local, layout, blended(0, 0), stacked),
-            _core.ShellMap(case.distant, layout, blended(0, 1)),
-        ],
-        [_core.ShellMap(case.distant, layout, blended(1, 0))],
+        [_core.ShellMap(local, layout, blended(0), stacked), distant],
+        [_core.ShellMap(case.distant, layout, blended(2))],
     ]
+    if case.between is not None:
+        parts[0].insert(1, _core.ShellMap(case.between, layout, blended(3)))
+        parts[1] = [distant]
     normals = scene.mesh.normals
     here = irradiance(case, normals, first) * (1 - weight) + irradiance(case, normals, first + 1) * weight
     diffuse = _core.diffuse_from_irradiance(samples, scene.mesh.triangles, here)
@@ -346,16 +387,21 @@ def reference(case: Case, pem: CasePem, code: RadianceCode, t: float) -> FloatAr
 
 def write_case(case: Case, folder: Path, image_format: ImageFormat) -> None:
     """Write the export and the reference pictures of a case."""
-    scene, pem = case_scene(case), CasePem()
+    scene, pem = case_scene(case), CasePem(case.projection)
     source = case_source(case, scene, pem)
     web = WebPem(source, WebOptions(image_format))
     write_folder(web, case.name, folder, lambda done, total, text: None)
     manifest = json.loads(web.read("manifest.json"))
     code = RadianceCode(**manifest["radiance"])
     pictures: list[dict[str, Any]] = []
-    for k, t in enumerate((0.0, 0.3)):
-        reference(case, pem, code, t).astype("<f4").tofile(folder / f"reference-{k}.f32")
-        pictures.append({"file": f"reference-{k}.f32", "parameter": t, "elevation": ELEVATION})
+    places = [(0.3, 0.0)]
+    if case.fade_degrees is not None:
+        places += [(0.3, 6.0), (0.8, 25.0)]
+    elif case.projection == "cube":
+        places += [(0.0, 0.0)]
+    for k, (t, raised) in enumerate(places):
+        reference(case, pem, code, t, raised).astype("<f4").tofile(folder / f"reference-{k}.f32")
+        pictures.append({"file": f"reference-{k}.f32", "parameter": t, "elevation": ELEVATION + raised})
     (folder / "reference.json").write_text(
         json.dumps({"width": WIDTH, "height": HEIGHT, "distance": DISTANCE, "pictures": pictures})
     )

@@ -5,6 +5,7 @@ import { UserError } from "./errors";
 import type { Files } from "./files";
 import { listen } from "./gestures";
 import { enterHeadset, hasHeadset } from "./headset";
+import { shellNames } from "./manifest";
 import { clamp } from "./math";
 import { Scene } from "./scene";
 import { fromLink, type Settings, toLink } from "./state";
@@ -70,13 +71,12 @@ export class App {
 
   private begin(scene: Scene): void {
     const { controls } = this;
-    const { axes, camera, samples, first, parts } = scene.manifest;
+    const { axes, camera, samples, first } = scene.manifest;
     controls.fill(scene.manifest);
-    const shells = Math.max(...parts.map((part) => part.shells.length));
     this.velocity = axes.map(() => 0);
     this.home = {
-      azimuth: camera.startDegrees,
-      elevation: (Math.atan2(camera.height, camera.radius) * 180) / Math.PI,
+      azimuth: 0.5 * (camera.azimuths[0] + camera.azimuths[1]),
+      elevation: 0.5 * (camera.elevations[0] + camera.elevations[1]),
       place: {},
       distance: Math.hypot(camera.radius, camera.height),
       compare: "off",
@@ -85,7 +85,7 @@ export class App {
       lookups: 4,
       diffuse: true,
       fresnel: true,
-      shells: Array<boolean>(shells).fill(true),
+      shells: shellNames(scene.manifest).map(() => true),
       background: "surroundings",
       exposure: 0,
       toneMapping: "neutral",

@@ -1,8 +1,11 @@
 /// Maps as the page receives them and as it keeps them on the GPU.
 ///
-/// A received atlas holds all levels of a cube map side by side (level_place in radiance_code.py). On the GPU each face is a
-/// layer of a 2D array texture that holds that face on all levels, each level with a border of one texel from the
-/// neighbouring faces: bilinear reads are then seamless by our own rule, not by that of a driver.
+/// A received atlas holds all levels of a map side by side (level_place in radiance_code.py). On the GPU each face is a
+/// layer of a 2D array texture that holds that face on all levels, each level with a border of one texel: on a cube from the
+/// neighbouring faces, so that bilinear reads are seamless by our own rule and not by that of a driver; on a paraboloid, whose
+/// texels go on beyond the rim, the last one again.
+
+import type { Projection } from "./manifest";
 
 export interface RadianceCode {
   low: number;
@@ -43,12 +46,28 @@ export function levelCount(size: number): number {
   return Math.log2(size) + 1;
 }
 
+export function faceCount(projection: Projection): number {
+  return projection === "cube" ? 6 : 2;
+}
+
+/// Faces of a level in a row of the received atlas, and rows of them.
+function facesOf(projection: Projection): { across: number; down: number } {
+  return projection === "cube" ? { across: 3, down: 2 } : { across: 2, down: 1 };
+}
+
+/// Pixels of the received atlas.
+export function atlasSize(size: number, projection: Projection): { width: number; height: number } {
+  const { across, down } = facesOf(projection);
+  return { width: across * size, height: down * (size + (size >> 1)) };
+}
+
 /// Top left texel of a level in the received atlas.
-export function sourcePlace(size: number, level: number): { x: number; y: number } {
+export function sourcePlace(size: number, level: number, projection: Projection): { x: number; y: number } {
   if (level === 0) return { x: 0, y: 0 };
+  const { across, down } = facesOf(projection);
   let x = 0;
-  for (let finer = 1; finer < level; ++finer) x += 3 * (size >> finer);
-  return { x, y: 2 * size };
+  for (let finer = 1; finer < level; ++finer) x += across * (size >> finer);
+  return { x, y: down * size };
 }
 
 /// Size of a layer on the GPU.
@@ -120,7 +139,7 @@ export function texelAcrossEdge(n: number, face: number, row: number, column: nu
 }
 
 /// How a layer of a map of `size` is put together: where each texel of it comes from in the received atlas. `source` has the
-/// place of every texel of all six layers; `corners` names those that are the mean of three, as [to, a, b, c].
+/// place of every texel of all layers; `corners` names those that are the mean of three, as [to, a, b, c].
 export interface Assembly {
   width: number;
   height: number;
@@ -128,34 +147,39 @@ export interface Assembly {
   corners: Int32Array;
 }
 
-const assemblies = new Map<number, Assembly>();
+const assemblies = new Map<string, Assembly>();
 
-export function assemblyOf(size: number): Assembly {
-  const known = assemblies.get(size);
+export function assemblyOf(size: number, projection: Projection): Assembly {
+  const key = `${projection} ${size}`;
+  const known = assemblies.get(key);
   if (known) return known;
   const { width, height } = layerSize(size);
-  const source = new Int32Array(6 * width * height).fill(-1);
+  const faces = faceCount(projection);
+  const { across } = facesOf(projection);
+  const source = new Int32Array(faces * width * height).fill(-1);
   const corners: number[] = [];
-  const columns = 3 * size;
+  const columns = across * size;
   for (let level = 0; level < levelCount(size); ++level) {
     const n = size >> level;
-    const from = sourcePlace(size, level);
+    const from = sourcePlace(size, level, projection);
     const to = layerPlace(size, level);
     const inAtlas = (texel: number) => {
       const face = Math.floor(texel / (n * n));
       const row = Math.floor(texel / n) % n;
       const column = texel % n;
-      return (from.y + Math.floor(face / 3) * n + row) * columns + from.x + (face % 3) * n + column;
+      return (from.y + Math.floor(face / across) * n + row) * columns + from.x + (face % across) * n + column;
     };
-    for (let face = 0; face < 6; ++face) {
+    for (let face = 0; face < faces; ++face) {
       const at = (row: number, column: number) =>
         (face * height + to.y + 1 + row) * width + to.x + 1 + column;
       for (let row = -1; row <= n; ++row) {
         for (let column = -1; column <= n; ++column) {
           const outside = Number(row < 0 || row >= n) + Number(column < 0 || column >= n);
-          if (outside === 2) {
-            const r = row < 0 ? 0 : n - 1;
-            const c = column < 0 ? 0 : n - 1;
+          const r = Math.min(Math.max(row, 0), n - 1);
+          const c = Math.min(Math.max(column, 0), n - 1);
+          if (projection === "paraboloid") {
+            source[at(row, column)] = inAtlas((face * n + r) * n + c);
+          } else if (outside === 2) {
             corners.push(at(row, column), at(r, c), at(row, c), at(r, column));
           } else {
             const texel =
@@ -167,17 +191,18 @@ export function assemblyOf(size: number): Assembly {
     }
   }
   const assembly = { width, height, source, corners: Int32Array.from(corners) };
-  assemblies.set(size, assembly);
+  assemblies.set(key, assembly);
   return assembly;
 }
 
-/// The six layers of a radiance map from the pixels (RGBA, 8 bit) of its atlas.
+/// The layers of a radiance map, one a face, from the pixels (RGBA, 8 bit) of its atlas.
 export function assembleRadiance(
   pixels: Uint8ClampedArray | Uint8Array,
   size: number,
+  projection: Projection,
   table: Float32Array,
 ): Uint32Array {
-  const { source, corners } = assemblyOf(size);
+  const { source, corners } = assemblyOf(size, projection);
   const layers = new Uint32Array(source.length);
   for (let i = 0; i < source.length; ++i) {
     const from = source[i];
@@ -200,8 +225,12 @@ export function assembleRadiance(
 }
 
 /// The same of α.
-export function assembleAlpha(pixels: Uint8ClampedArray | Uint8Array, size: number): Uint8Array {
-  const { source, corners } = assemblyOf(size);
+export function assembleAlpha(
+  pixels: Uint8ClampedArray | Uint8Array,
+  size: number,
+  projection: Projection,
+): Uint8Array {
+  const { source, corners } = assemblyOf(size, projection);
   const layers = new Uint8Array(source.length);
   for (let i = 0; i < source.length; ++i) {
     if (source[i] >= 0) layers[i] = pixels[4 * source[i]];

@@ -1,6 +1,6 @@
 /// The page's elements: made once, wired to the settings.
 
-import type { Axis, Manifest } from "./manifest";
+import { type Axis, type Manifest, shellNames } from "./manifest";
 import type { Settings } from "./state";
 
 type Change = Partial<Settings>;
@@ -104,12 +104,7 @@ export class Controls {
     });
     this.footer.hidden = this.sliders.length === 0;
     const hasStills = manifest.samples.some((sample) => sample.still !== null);
-    const shells: string[] = [];
-    for (const part of manifest.parts) {
-      part.shells.forEach((shell, i) => {
-        shells[i] ??= shell.name;
-      });
-    }
+    const shells = shellNames(manifest);
     const compares: [string, string][] = [
       ["off", "nothing"],
       ["static", "a static environment map"],

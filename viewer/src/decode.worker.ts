@@ -1,13 +1,18 @@
 /// Decodes images away from the page's own thread, and expands their codes before anything is filtered.
 
-import { assembleAlpha, assembleRadiance, packSharedExponent, radianceTable } from "./atlas";
+import { assembleAlpha, assembleRadiance, atlasSize, packSharedExponent, radianceTable } from "./atlas";
 import type { Decoded, DecodeRequest } from "./decoder";
+
+const MOST_PIXELS = 1 << 26;
 
 async function pixelsOf(bytes: ArrayBuffer, type: string): Promise<ImageData> {
   const bitmap = await createImageBitmap(new Blob([bytes], { type }), {
     colorSpaceConversion: "none",
     premultiplyAlpha: "none",
   });
+  if (bitmap.width * bitmap.height > MOST_PIXELS) {
+    throw new Error(`is ${bitmap.width}×${bitmap.height} pixels`);
+  }
   const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
   const context = canvas.getContext("2d", { willReadFrequently: true });
   if (!context) throw new Error("no 2D canvas");
@@ -36,13 +41,14 @@ async function decode(request: DecodeRequest): Promise<Decoded> {
     return { width, height, packed };
   }
   if (request.kind === "texture") return { width, height, pixels: new Uint8Array(data.buffer) };
-  const { size } = request;
-  const rows = size > 1 ? 3 * size : 2;
-  if (width !== 3 * size || height !== rows) {
-    throw new Error(`is ${width}×${height} pixels, not ${3 * size}×${rows}`);
+  const { size, projection } = request;
+  const expected = atlasSize(size, projection);
+  if (width !== expected.width || height !== expected.height) {
+    throw new Error(`is ${width}×${height} pixels, not ${expected.width}×${expected.height}`);
   }
-  if (request.kind === "alpha") return { width, height, alpha: assembleAlpha(data, size) };
-  return { width, height, packed: assembleRadiance(data, size, radianceTable(request.code)) };
+  if (request.kind === "alpha") return { width, height, alpha: assembleAlpha(data, size, projection) };
+  const packed = assembleRadiance(data, size, projection, radianceTable(request.code));
+  return { width, height, packed };
 }
 
 self.onmessage = async (event: MessageEvent<DecodeRequest & { id: number }>) => {

@@ -3,12 +3,13 @@
 import type { RadianceCode } from "./atlas";
 import DecodeWorker from "./decode.worker?worker&inline";
 import { UserError } from "./errors";
+import type { Projection } from "./manifest";
 
 export type DecodeRequest = { bytes: ArrayBuffer; type: string } & (
   | { kind: "probe" }
   | { kind: "still"; code: RadianceCode }
-  | { kind: "radiance"; size: number; code: RadianceCode }
-  | { kind: "alpha"; size: number }
+  | { kind: "radiance"; size: number; projection: Projection; code: RadianceCode }
+  | { kind: "alpha"; size: number; projection: Projection }
   | { kind: "texture" }
 );
 

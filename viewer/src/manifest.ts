@@ -15,13 +15,24 @@ export interface ProxyShape {
   radius?: number;
 }
 
-export interface Shell {
+export type Projection = "cube" | "paraboloid";
+
+/// A map that there is once for every sample, whichever shells read it.
+export interface MapEntry {
   name: string;
   size: number;
   opaque: boolean;
+}
+
+export interface Shell {
+  name: string;
+  /// Number of the map that lies on it.
+  map: number;
   proxy: ProxyShape;
   /// Whether the proxy moves with the object.
   moves: boolean;
+  /// Whether triangles on the object's convex hull read it.
+  onHull: boolean;
 }
 
 export interface TextureUse {
@@ -69,7 +80,7 @@ export interface MapFiles {
 
 export interface Sample {
   parameter: number[];
-  maps: MapFiles[][];
+  maps: MapFiles[];
   still: string | null;
   /// File of the vertices' irradiance, if it changes from sample to sample.
   irradiance: string | null;
@@ -111,6 +122,9 @@ export interface Manifest {
     height: number;
     startDegrees: number;
     degrees: number;
+    /// Of all cameras, the lowest and the highest.
+    azimuths: [number, number];
+    elevations: [number, number];
     verticalFovDegrees: number;
     aspect: number;
     pixels: number;
@@ -129,13 +143,22 @@ export interface Manifest {
     ranges: Range[];
     bytes: number;
   };
+  projection: Projection;
+  maps: MapEntry[];
   parts: { name: string; shells: Shell[] }[];
-  static: { image: string; size: number; proxy: ProxyShape };
+  static: {
+    image: string;
+    size: number;
+    proxy: ProxyShape;
+    /// The static set, drawn far from the samples, and how many degrees beyond them it is half of what is drawn.
+    maps: MapFiles[] | null;
+    fadeDegrees: number | null;
+  };
   samples: Sample[];
   first: number;
 }
 
-const VERSION = 2;
+const VERSION = 3;
 
 const LARGEST_MESH = 1 << 30;
 
@@ -247,6 +270,61 @@ function checkMesh(data: Manifest): void {
   if (!valid) damaged("the mesh has other parts");
 }
 
+const MOST_PARTS = 65535;
+const MOST_SHELLS = 64;
+
+function checkMaps(data: Manifest): void {
+  if (data.projection !== "cube" && data.projection !== "paraboloid")
+    damaged(`this page knows no maps of the projection ${data.projection}`);
+  if (!Array.isArray(data.maps) || data.maps.length < 1) damaged("it has no maps");
+  for (const map of data.maps) {
+    if (!isSize(map?.size)) damaged(`the size of the map ${map?.name} is ${map?.size}`);
+    if (typeof map.opaque !== "boolean") damaged(`the map ${map.name} is not described`);
+  }
+  if (data.parts.length > MOST_PARTS) damaged(`it has ${data.parts.length} parts`);
+  for (const part of data.parts) {
+    const shells = part?.shells;
+    if (!Array.isArray(shells) || shells.length < 1 || shells.length > MOST_SHELLS)
+      damaged(`part ${part?.name} has no shells`);
+    shells.forEach((shell, s) => {
+      if (!isIndex(shell?.map, data.maps.length)) damaged(`shell ${shell?.name} has no map`);
+      if (data.maps[shell.map].opaque !== (s === shells.length - 1))
+        damaged(`shell ${shell.name} has a map that is not for its place`);
+      checkProxy(shell.proxy, `shell ${shell.name}`);
+    });
+  }
+}
+
+function areMaps(files: unknown, maps: MapEntry[]): boolean {
+  return (
+    Array.isArray(files) &&
+    files.length === maps.length &&
+    files.every((f, m) => isName(f?.radiance) && (maps[m].opaque ? f.alpha === null : isName(f.alpha)))
+  );
+}
+
+function checkCamera(data: Manifest): void {
+  const { camera } = data;
+  const isRange = (range: unknown) =>
+    Array.isArray(range) && range.length === 2 && range.every(Number.isFinite) && range[0] <= range[1];
+  const valid =
+    isVector(camera?.target) &&
+    [camera.radius, camera.height, camera.startDegrees, camera.degrees].every(Number.isFinite) &&
+    camera.radius >= 0 &&
+    isRange(camera.azimuths) &&
+    isRange(camera.elevations) &&
+    camera.verticalFovDegrees > 0 &&
+    camera.verticalFovDegrees < 180 &&
+    Number.isFinite(camera.aspect) &&
+    camera.aspect > 0;
+  if (!valid) damaged("it has no camera");
+}
+
+/// Names of the shells of all parts, each once: what can be switched on and off.
+export function shellNames(manifest: Manifest): string[] {
+  return [...new Set(manifest.parts.flatMap((part) => part.shells.map((shell) => shell.name)))];
+}
+
 /// Parses and checks a manifest; throws UserError.
 export function parseManifest(text: string): Manifest {
   let data: Manifest & { format?: string; version?: number };
@@ -265,38 +343,28 @@ export function parseManifest(text: string): Manifest {
   if (!Array.isArray(data.parts) || data.parts.length < 1) damaged("it has no parts");
   if (!Array.isArray(data.samples) || data.samples.length < 1) damaged("it has no samples");
   checkAxes(data);
-  for (const part of data.parts) {
-    if (!Array.isArray(part.shells) || part.shells.length < 1) damaged(`part ${part.name} has no shells`);
-    for (const shell of part.shells) {
-      if (!isSize(shell.size)) damaged(`the size of shell ${shell.name} is ${shell.size}`);
-      checkProxy(shell.proxy, `shell ${shell.name}`);
-    }
-  }
+  checkMaps(data);
   for (const sample of data.samples) {
     const fits =
       Array.isArray(sample.parameter) &&
       sample.parameter.length === data.axes.length &&
       sample.parameter.every(Number.isFinite) &&
-      Array.isArray(sample.maps) &&
-      sample.maps.length === data.parts.length &&
-      sample.maps.every(
-        (maps, p) =>
-          Array.isArray(maps) &&
-          maps.length === data.parts[p].shells.length &&
-          maps.every((m) => isName(m.radiance) && (m.alpha === null || isName(m.alpha))),
-      ) &&
+      areMaps(sample.maps, data.maps) &&
       (sample.still === null || isName(sample.still)) &&
       (sample.irradiance === null || isName(sample.irradiance));
-    if (!fits) damaged("a sample does not have the maps of all parts and shells");
+    if (!fits) damaged("a sample does not have all maps");
   }
   if (!isSize(data.static?.size) || !isName(data.static.image)) damaged("the static map is not described");
   checkProxy(data.static.proxy, "the static map");
+  const { maps, fadeDegrees } = data.static;
+  const fades = fadeDegrees === null || (maps !== null && Number.isFinite(fadeDegrees) && fadeDegrees > 0);
+  if ((maps !== null && !areMaps(maps, data.maps)) || !fades) damaged("the static set is not described");
   checkMaterials(data);
   checkMesh(data);
   if (!isName(data.probe?.file) || !isName(data.poster?.file)) damaged("the poster is not described");
   if (!Array.isArray(data.runTime?.places) || data.runTime.places.length < 1)
     damaged("it has no run-time model");
-  if (!isVector(data.camera?.target) || !(data.camera.radius >= 0)) damaged("it has no camera");
+  checkCamera(data);
   if (!(data.first >= 0 && data.first < data.samples.length)) data.first = 0;
   return data;
 }

@@ -1,12 +1,13 @@
 /// Everything that is loaded, and one picture of it: the viewer without its controls.
 
 import { SampleCache } from "./cache";
-import { Decoder, sameColours } from "./decoder";
+import { type Decoded, type DecodeRequest, Decoder, sameColours } from "./decoder";
 import { UserError } from "./errors";
+import { degreesOutside, fadeWeight } from "./fade";
 import { type Files, textOf } from "./files";
 import { irradianceTexels } from "./gl/map_pool";
 import { type FrameState, Renderer } from "./gl/renderer";
-import { type Axis, type Manifest, parseManifest, type Vec3 } from "./manifest";
+import { type Axis, type Manifest, type MapFiles, parseManifest, type Vec3 } from "./manifest";
 import {
   add,
   type ImageWindow,
@@ -43,6 +44,7 @@ export class Scene {
   private stillWanted = -1;
   private readonly frame: FrameState;
   private hasStatic = false;
+  private hasSet = false;
   private readonly here: number[];
   private readonly nearest: Blend;
 
@@ -83,7 +85,9 @@ export class Scene {
       weights: this.cache.blend.weights,
       turn: 0,
       offset: [0, 0, 0],
-      pem: 0,
+      hasSamples: false,
+      hasSet: false,
+      fade: 1,
       shellsOn: [],
       fresnelOn: true,
       diffuseOn: true,
@@ -122,6 +126,7 @@ export class Scene {
     this.cache.forget();
     this.stillShown = -1;
     this.hasStatic = false;
+    this.hasSet = false;
     await this.loadStatic();
   }
 
@@ -254,7 +259,9 @@ export class Scene {
       frame.turn = (t * motion.turn * Math.PI) / 180;
       for (let i = 0; i < 3; ++i) frame.offset[i] = t * motion.to[i];
     }
-    frame.pem = this.cache.share;
+    frame.hasSamples = this.cache.share > 0;
+    frame.hasSet = this.hasSet;
+    frame.fade = this.fade(pose.eye);
     frame.shellsOn = s.shells;
     frame.fresnelOn = s.fresnel;
     frame.diffuseOn = s.diffuse;
@@ -265,6 +272,17 @@ export class Scene {
     frame.stillScale[0] = (growth * width) / height / camera.aspect;
     frame.stillScale[1] = growth;
     return frame;
+  }
+
+  /// Whether all is there that does not belong to a sample.
+  get isComplete(): boolean {
+    return this.hasStatic && (this.hasSet || this.manifest.static.maps === null);
+  }
+
+  /// The share that the samples keep from the static set in the view of an eye.
+  fade(eye: Vec3): number {
+    const degrees = this.manifest.static.fadeDegrees;
+    return degrees === null ? 1 : fadeWeight(degrees, degreesOutside(this.manifest.camera, eye));
   }
 
   private makeCache(): SampleCache {
@@ -286,25 +304,43 @@ export class Scene {
 
   private async loadStatic(): Promise<void> {
     const { image, size } = this.manifest.static;
-    const { file, type } = this.image(image);
-    const bytes = await this.files.read(file);
-    this.events.progress("Loading the surroundings", 0.3);
     const { renderer } = this;
-    const code = this.manifest.radiance;
-    const { packed } = await this.decoder.decode(file, { kind: "radiance", bytes, type, size, code });
+    const { radiance: code, projection } = this.manifest;
+    this.events.progress("Loading the surroundings", 0.3);
+    const { packed } = await this.decoded(image, (bytes, type) => ({
+      kind: "radiance",
+      bytes,
+      type,
+      size,
+      projection,
+      code,
+    }));
     if (packed && renderer === this.renderer) renderer.uploadStatic(packed);
     await Promise.all(
       this.manifest.textures.map((texture, number) => this.loadTexture(texture.image, number)),
     );
     this.hasStatic = true;
     this.events.changed();
+    const { maps } = this.manifest.static;
+    if (maps === null) return;
+    // Not waited for: the captured map and the samples do for a while.
+    this.loadMaps(maps, renderer.pool.setSlot).then(
+      () => {
+        if (renderer !== this.renderer) return;
+        this.hasSet = true;
+        this.events.changed();
+      },
+      (failure) => this.events.failed(failure),
+    );
   }
 
   private async loadTexture(name: string, number: number): Promise<void> {
-    const { file, type } = this.image(name);
     const { renderer } = this;
-    const bytes = await this.files.read(file);
-    const { width, height, pixels } = await this.decoder.decode(file, { kind: "texture", bytes, type });
+    const { width, height, pixels } = await this.decoded(name, (bytes, type) => ({
+      kind: "texture",
+      bytes,
+      type,
+    }));
     if (pixels && renderer === this.renderer) renderer.uploadTexture(number, width, height, pixels);
   }
 
@@ -317,59 +353,62 @@ export class Scene {
   }
 
   private async loadSample(sample: number, slot: number): Promise<void> {
+    const { maps, irradiance } = this.manifest.samples[sample];
+    await Promise.all([
+      this.loadMaps(maps, slot),
+      irradiance === null ? undefined : this.loadIrradiance(irradiance, slot),
+    ]);
+  }
+
+  /// The maps of a sample, or of the static set, into a slot.
+  private async loadMaps(maps: MapFiles[], slot: number): Promise<void> {
     const { renderer } = this;
-    const code = this.manifest.radiance;
-    const jobs = this.manifest.samples[sample].maps.flatMap((maps, part) =>
-      maps.map(async (map, shell) => {
-        const { size } = this.manifest.parts[part].shells[shell];
-        const radiance = this.image(map.radiance);
-        const alpha = map.alpha === null ? null : this.image(map.alpha);
+    const { radiance: code, projection } = this.manifest;
+    await Promise.all(
+      maps.map(async (map, number) => {
+        const { size } = this.manifest.maps[number];
         const [light, cover] = await Promise.all([
-          this.files.read(radiance.file).then((bytes) =>
-            this.decoder.decode(radiance.file, {
-              kind: "radiance",
-              bytes,
-              type: radiance.type,
-              size,
-              code,
-            }),
-          ),
-          alpha &&
-            this.files
-              .read(alpha.file)
-              .then((bytes) =>
-                this.decoder.decode(alpha.file, { kind: "alpha", bytes, type: alpha.type, size }),
-              ),
+          this.decoded(map.radiance, (bytes, type) => ({
+            kind: "radiance",
+            bytes,
+            type,
+            size,
+            projection,
+            code,
+          })),
+          map.alpha === null
+            ? undefined
+            : this.decoded(map.alpha, (bytes, type) => ({ kind: "alpha", bytes, type, size, projection })),
         ]);
         if (renderer !== this.renderer || !light.packed) return;
-        renderer.uploadMap(slot, part, shell, light.packed, cover?.alpha);
+        renderer.uploadMap(slot, number, light.packed, cover?.alpha);
       }),
     );
-    const { irradiance } = this.manifest.samples[sample];
-    if (irradiance !== null) jobs.push(this.loadIrradiance(irradiance, slot));
-    await Promise.all(jobs);
+  }
+
+  private async decoded(
+    name: string,
+    request: (bytes: ArrayBuffer, type: string) => DecodeRequest,
+  ): Promise<Decoded> {
+    const { file, type } = this.image(name);
+    return this.decoder.decode(file, request(await this.files.read(file), type));
   }
 
   private wantStill(sample: number): void {
     const name = this.manifest.samples[sample].still;
     if (name === null || sample === this.stillWanted) return;
     this.stillWanted = sample;
-    const { file, type } = this.image(name);
     const { renderer } = this;
-    this.files
-      .read(file)
-      .then((bytes) =>
-        this.decoder.decode(file, { kind: "still", bytes, type, code: this.manifest.radiance }),
-      )
-      .then(
-        ({ width, height, packed }) => {
-          if (sample !== this.stillWanted || renderer !== this.renderer || !packed) return;
-          renderer.uploadStill(width, height, packed);
-          this.stillShown = sample;
-          this.events.changed();
-        },
-        (failure) => this.events.failed(failure),
-      );
+    const code = this.manifest.radiance;
+    this.decoded(name, (bytes, type) => ({ kind: "still", bytes, type, code })).then(
+      ({ width, height, packed }) => {
+        if (sample !== this.stillWanted || renderer !== this.renderer || !packed) return;
+        renderer.uploadStill(width, height, packed);
+        this.stillShown = sample;
+        this.events.changed();
+      },
+      (failure) => this.events.failed(failure),
+    );
   }
 }
 

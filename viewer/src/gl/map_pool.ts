@@ -1,4 +1,4 @@
-import { layerSize } from "../atlas";
+import { faceCount, layerSize } from "../atlas";
 import { UserError } from "../errors";
 import type { Manifest } from "../manifest";
 import type { Counters } from "./program";
@@ -10,7 +10,8 @@ export const IRRADIANCE_UNIT = 2;
 export function sampleBytes(manifest: Manifest): number {
   const { width, height } = layerSize(largestSize(manifest));
   const { maps, alphas } = mapCounts(manifest);
-  return 6 * width * height * (4 * maps + alphas) + 6 * irradianceTexels(manifest);
+  const texels = faceCount(manifest.projection) * width * height;
+  return texels * (4 * maps + alphas) + 6 * irradianceTexels(manifest);
 }
 
 /// Texels of a sample's irradiance: one for each vertex, whole rows of them; 0 where it does not change.
@@ -20,19 +21,21 @@ export function irradianceTexels(manifest: Manifest): number {
 }
 
 export function largestSize(manifest: Manifest): number {
-  return Math.max(manifest.static.size, ...manifest.parts.flatMap((p) => p.shells.map((s) => s.size)));
+  return manifest.maps.reduce((size, map) => Math.max(size, map.size), manifest.static.size);
 }
 
 /// Maps of a sample, and those of them that have an α.
 export function mapCounts(manifest: Manifest): { maps: number; alphas: number } {
-  const shells = manifest.parts.flatMap((p) => p.shells);
-  return { maps: shells.length, alphas: shells.filter((s) => !s.opaque).length };
+  return { maps: manifest.maps.length, alphas: manifest.maps.filter((map) => !map.opaque).length };
 }
 
-/// The maps on the GPU: array textures of one size for the life of the page, in which samples take turns.
+/// The maps on the GPU: array textures of one size for the life of the page, in which samples take turns. Behind their slots
+/// there is one that the static set keeps, if there is such a set, and the captured map.
 export class MapPool {
   /// How many samples there is room for.
   readonly capacity: number;
+  /// The slot of the static set.
+  readonly setSlot: number;
   readonly bytes: number;
   readonly width: number;
   readonly height: number;
@@ -40,6 +43,8 @@ export class MapPool {
   private readonly alpha: WebGLTexture | null;
   private readonly irradiance: WebGLTexture | null = null;
   private readonly irradianceRows: number;
+  private readonly faces: number;
+  private readonly slots: number;
   private readonly maps: number;
   private readonly alphas: number;
 
@@ -59,18 +64,23 @@ export class MapPool {
     this.alphas = alphas;
     const layers = gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number;
     const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
-    const room = Math.floor((layers / 6 - 1) / maps);
+    const faces = faceCount(manifest.projection);
+    const sets = manifest.static.maps === null ? 0 : 1;
+    const room = Math.floor((layers / faces - 1) / maps) - sets;
     if (room < least || Math.max(width, height) > side) {
       throw new UserError(
         "texture",
-        `This graphics card has no room for the maps: they need ${6 * (least * maps + 1)} layers of ` +
+        `This graphics card has no room for the maps: they need ${faces * ((least + sets) * maps + 1)} layers of ` +
           `${width}×${height} texels, it has ${layers} of ${side}×${side}.`,
       );
     }
-    const affordable = Math.floor(budget / sampleBytes(manifest));
+    const affordable = Math.floor(budget / sampleBytes(manifest)) - sets;
     this.capacity = Math.min(Math.max(affordable, least), room, manifest.samples.length);
-    const radianceLayers = 6 * (this.capacity * maps + 1);
-    const alphaLayers = Math.max(6 * this.capacity * alphas, 1);
+    this.setSlot = this.capacity;
+    this.slots = this.capacity + sets;
+    this.faces = faces;
+    const radianceLayers = faces * (this.slots * maps + 1);
+    const alphaLayers = Math.max(faces * this.slots * alphas, 1);
     this.irradianceRows = irradianceTexels(manifest) / IRRADIANCE_ROW;
     this.bytes =
       width * height * (4 * radianceLayers + alphaLayers) +
@@ -88,19 +98,19 @@ export class MapPool {
     }
   }
 
-  /// First layer of a map of the sample in a slot; `map` counts through parts and shells.
+  /// First layer of a map of the sample in a slot.
   radianceLayer(slot: number, map: number): number {
-    return 6 * (slot * this.maps + map);
+    return this.faces * (slot * this.maps + map);
   }
 
-  /// The same of α; `map` counts the shells that have one.
+  /// The same of α; `map` counts the maps that have one.
   alphaLayer(slot: number, map: number): number {
-    return 6 * (slot * this.alphas + map);
+    return this.faces * (slot * this.alphas + map);
   }
 
-  /// First layer of the static map.
+  /// First layer of the captured map.
   staticLayer(): number {
-    return 6 * this.capacity * this.maps;
+    return this.faces * this.slots * this.maps;
   }
 
   uploadRadiance(layer: number, width: number, height: number, texels: Uint32Array): void {
@@ -114,7 +124,7 @@ export class MapPool {
       layer,
       width,
       height,
-      6,
+      this.faces,
       gl.RGB,
       gl.UNSIGNED_INT_5_9_9_9_REV,
       texels,
@@ -126,7 +136,19 @@ export class MapPool {
     const { gl } = this;
     gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.alpha);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 6, gl.RED, gl.UNSIGNED_BYTE, texels);
+    gl.texSubImage3D(
+      gl.TEXTURE_2D_ARRAY,
+      0,
+      0,
+      0,
+      layer,
+      width,
+      height,
+      this.faces,
+      gl.RED,
+      gl.UNSIGNED_BYTE,
+      texels,
+    );
     ++this.counters.uploaded;
   }
 

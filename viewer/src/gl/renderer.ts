@@ -2,7 +2,7 @@
 
 import { layerSize } from "../atlas";
 import { UserError } from "../errors";
-import type { Manifest, Range } from "../manifest";
+import { type Manifest, type Range, shellNames } from "../manifest";
 import type { View } from "../math";
 import type { Mesh } from "../mesh";
 import { nodeCount } from "../space";
@@ -33,8 +33,12 @@ export interface FrameState {
   /// Turn of the object in radians, and how far it has moved.
   turn: number;
   offset: [number, number, number];
-  /// Share of the PEM, the rest is the static map; 0 while no sample is there.
-  pem: number;
+  /// Whether a sample is there.
+  hasSamples: boolean;
+  /// Whether the static set is there, and the share that the samples keep from it in this view.
+  hasSet: boolean;
+  fade: number;
+  /// By the names of shells.
   shellsOn: boolean[];
   fresnelOn: boolean;
   diffuseOn: boolean;
@@ -51,12 +55,12 @@ interface PartUniforms {
   /// Of the shells, front to back, and last of the static map.
   proxies: Proxies;
   size: Float32Array;
+  /// Numbers of the shells' names.
+  names: number[];
   shellOn: Float32Array;
+  shellOnHull: Float32Array;
   radianceLayer: Float32Array;
   alphaLayer: Float32Array;
-  /// Numbers of the part's first map and first α within a sample.
-  firstMap: number;
-  firstAlpha: number;
 }
 
 export class Renderer {
@@ -77,6 +81,10 @@ export class Renderer {
   private readonly nodes: number;
   private readonly weights: Float32Array;
   private readonly slots: Float32Array;
+  /// Of the blended samples and last, if there is one, of the static set.
+  private readonly mixture: Float32Array;
+  /// Number of a map among those that have an α; -1: it has none.
+  private readonly alphaOf: number[];
   private readonly flat: boolean;
   private stillTexture: WebGLTexture | null = null;
 
@@ -95,11 +103,19 @@ export class Renderer {
     this.nodes = nodeCount(manifest.axes);
     this.weights = new Float32Array(this.nodes);
     this.slots = new Float32Array(this.nodes);
+    this.mixture = new Float32Array(this.nodes + (manifest.static.maps === null ? 0 : 1));
+    let alphas = 0;
+    this.alphaOf = manifest.maps.map((map) => (map.opaque ? -1 : alphas++));
     this.motion = { cosine: 1, sine: 0, pivot: manifest.motion?.pivot ?? ORIGIN, offset: ORIGIN };
     this.pool = new MapPool(gl, manifest, budget, this.nodes, this.counters);
     this.targets = new Targets(gl, this.counters);
     for (const part of manifest.parts) this.meshProgram(part.shells.length);
-    this.background = new Program(gl, shaders.FULL_VERTEX, shaders.BACKGROUND_FRAGMENT, this.counters);
+    this.background = new Program(
+      gl,
+      shaders.FULL_VERTEX,
+      shaders.backgroundFragment(manifest.projection),
+      this.counters,
+    );
     this.still = new Program(gl, shaders.FULL_VERTEX, shaders.STILL_FRAGMENT, this.counters);
     this.copy = new Program(gl, shaders.FULL_VERTEX, shaders.COPY_FRAGMENT, this.counters);
     this.display = new Program(gl, shaders.FULL_VERTEX, shaders.DISPLAY_FRAGMENT, this.counters);
@@ -108,25 +124,20 @@ export class Renderer {
     this.flat = mesh.normals === null;
     this.surfaces = new Surfaces(gl, manifest, this.counters);
     this.staticProxy = new Proxies([manifest.static.proxy], [false]);
-    let firstMap = 0;
-    let firstAlpha = 0;
-    this.parts = manifest.parts.map(({ shells }) => {
-      const uniforms: PartUniforms = {
-        proxies: new Proxies(
-          [...shells.map((s) => s.proxy), manifest.static.proxy],
-          [...shells.map((s) => s.moves), false],
-        ),
-        size: Float32Array.from([...shells.map((s) => s.size), manifest.static.size]),
-        shellOn: new Float32Array(shells.length).fill(1),
-        radianceLayer: new Float32Array(shells.length * this.nodes),
-        alphaLayer: new Float32Array(shells.length * this.nodes),
-        firstMap,
-        firstAlpha,
-      };
-      firstMap += shells.length;
-      firstAlpha += shells.filter((s) => !s.opaque).length;
-      return uniforms;
-    });
+    const names = shellNames(manifest);
+    const mixed = this.mixture.length;
+    this.parts = manifest.parts.map(({ shells }) => ({
+      proxies: new Proxies(
+        [...shells.map((s) => s.proxy), manifest.static.proxy],
+        [...shells.map((s) => s.moves), false],
+      ),
+      size: Float32Array.from([...shells.map((s) => manifest.maps[s.map].size), manifest.static.size]),
+      names: shells.map((s) => names.indexOf(s.name)),
+      shellOn: new Float32Array(shells.length),
+      shellOnHull: new Float32Array(shells.length),
+      radianceLayer: new Float32Array(shells.length * mixed),
+      alphaLayer: new Float32Array(shells.length * mixed),
+    }));
   }
 
   private meshProgram(shells: number): Program {
@@ -135,7 +146,7 @@ export class Renderer {
       program = new Program(
         this.gl,
         shaders.meshVertex(this.nodes),
-        shaders.meshFragment(shells, this.nodes),
+        shaders.meshFragment(shells, this.mixture.length, this.manifest.projection),
         this.counters,
       );
       this.meshPrograms.set(shells, program);
@@ -177,22 +188,12 @@ export class Renderer {
     this.pool.uploadRadiance(this.pool.staticLayer(), width, height, texels);
   }
 
-  /// One map of the sample in a slot. `alpha` for shells that have one.
-  uploadMap(
-    slot: number,
-    part: number,
-    shell: number,
-    texels: Uint32Array,
-    alpha: Uint8Array | undefined,
-  ): void {
-    const { shells } = this.manifest.parts[part];
-    const { width, height } = layerSize(shells[shell].size);
-    const uniforms = this.parts[part];
-    this.pool.uploadRadiance(this.pool.radianceLayer(slot, uniforms.firstMap + shell), width, height, texels);
-    if (alpha) {
-      const before = shells.slice(0, shell).filter((s) => !s.opaque).length;
-      this.pool.uploadAlpha(this.pool.alphaLayer(slot, uniforms.firstAlpha + before), width, height, alpha);
-    }
+  /// One map of the sample in a slot, or of the static set. `alpha` for maps that have one.
+  uploadMap(slot: number, map: number, texels: Uint32Array, alpha: Uint8Array | undefined): void {
+    const { pool } = this;
+    const { width, height } = layerSize(this.manifest.maps[map].size);
+    pool.uploadRadiance(pool.radianceLayer(slot, map), width, height, texels);
+    if (alpha) pool.uploadAlpha(pool.alphaLayer(slot, this.alphaOf[map]), width, height, alpha);
   }
 
   /// Pixels RGBA of a texture of the materials.
@@ -314,6 +315,7 @@ export class Renderer {
     gl.depthFunc(gl.LESS);
     gl.bindVertexArray(this.vertices);
     this.move(frame);
+    this.mix(frame);
     for (const range of this.manifest.mesh.ranges) this.drawRange(frame, content, place, range);
   }
 
@@ -345,6 +347,17 @@ export class Renderer {
     this.motion.sine = Math.sin(frame.turn);
     this.motion.offset = frame.offset;
     for (const part of this.parts) part.proxies.move(this.motion);
+  }
+
+  /// The shares of the blended samples and of the static set.
+  private mix(frame: FrameState): void {
+    const fade = frame.hasSet ? (frame.hasSamples ? frame.fade : 0) : 1;
+    for (let n = 0; n < this.nodes; ++n) {
+      this.weights[n] = frame.weights[n];
+      this.slots[n] = frame.slots[n];
+      this.mixture[n] = fade * frame.weights[n];
+    }
+    if (this.mixture.length > this.nodes) this.mixture[this.nodes] = 1 - fade;
   }
 
   private drawRange(frame: FrameState, content: Content, place: [number, number], range: Range): void {
@@ -384,39 +397,35 @@ export class Renderer {
     gl.uniform1i(program.at("uFlat"), this.flat ? 1 : 0);
     part.proxies.set(gl, program);
     gl.uniform1fv(program.at("uSize"), part.size);
-    let alpha = 0;
     for (let s = 0; s < shells.length; ++s) {
-      part.shellOn[s] = frame.shellsOn[s] === false ? 0 : 1;
-      for (let n = 0; n < this.nodes; ++n) {
+      const { map, onHull } = shells[s];
+      part.shellOn[s] = frame.shellsOn[part.names[s]] === false ? 0 : 1;
+      part.shellOnHull[s] = onHull ? part.shellOn[s] : 0;
+      for (let n = 0; n < this.mixture.length; ++n) {
         const at = n * shells.length + s;
-        part.radianceLayer[at] = pool.radianceLayer(frame.slots[n], part.firstMap + s);
-        part.alphaLayer[at] = shells[s].opaque
-          ? -1
-          : pool.alphaLayer(frame.slots[n], part.firstAlpha + alpha);
+        const slot = n < this.nodes ? frame.slots[n] : pool.setSlot;
+        part.radianceLayer[at] = pool.radianceLayer(slot, map);
+        part.alphaLayer[at] = this.alphaOf[map] < 0 ? -1 : pool.alphaLayer(slot, this.alphaOf[map]);
       }
-      if (!shells[s].opaque) ++alpha;
     }
-    for (let n = 0; n < this.nodes; ++n) {
-      this.weights[n] = frame.weights[n];
-      this.slots[n] = frame.slots[n];
-    }
-    gl.uniform1fv(program.at("uShellOn"), part.shellOn);
+    const hasMaps = frame.hasSamples || frame.hasSet;
     gl.uniform1fv(program.at("uRadianceLayer"), part.radianceLayer);
     gl.uniform1fv(program.at("uAlphaLayer"), part.alphaLayer);
     gl.uniform1fv(program.at("uWeight"), this.weights);
+    gl.uniform1fv(program.at("uMixture"), this.mixture);
     gl.uniform1f(program.at("uStaticLayer"), pool.staticLayer());
-    gl.uniform1f(program.at("uPem"), content === "pem" ? frame.pem : 0);
+    gl.uniform1i(program.at("uCaptured"), content === "pem" && hasMaps ? 0 : 1);
     gl.uniform1i(program.at("uIrradiance"), IRRADIANCE_UNIT);
-    gl.uniform1i(program.at("uIrradianceChanges"), pool.hasIrradiance && frame.pem > 0 ? 1 : 0);
+    gl.uniform1i(program.at("uIrradianceChanges"), pool.hasIrradiance && frame.hasSamples ? 1 : 0);
     gl.uniform1fv(program.at("uSlot"), this.slots);
     this.surfaces.set(program, range.material, frame.fresnelOn, frame.diffuseOn);
     // Triangles that carry all shells, then those on the hull.
-    const stacked = program.at("uStacked");
-    gl.uniform1i(stacked, 1);
+    const shellOn = program.at("uShellOn");
+    gl.uniform1fv(shellOn, part.shellOn);
     if (range.stacked > 0) {
       gl.drawElements(gl.TRIANGLES, 3 * range.stacked, gl.UNSIGNED_INT, 12 * range.start);
     }
-    gl.uniform1i(stacked, 0);
+    gl.uniform1fv(shellOn, part.shellOnHull);
     if (range.count > range.stacked) {
       gl.drawElements(
         gl.TRIANGLES,

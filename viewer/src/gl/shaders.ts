@@ -1,12 +1,19 @@
 /// The drawing itself. Every level and every tap of a lookup is placed here, by the formula of the run-time model
 /// (mirrorbake/envmap/reads.hpp, mirrorbake/surface/lookup.hpp): drivers' own levels and anisotropy differ between cards.
 
+import type { Projection } from "../manifest";
+
 const HEADER = `#version 300 es
 precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
 `;
+
+/// The header of a program that reads maps: functions below have a body for each projection.
+function mapHeader(projection: Projection): string {
+  return `${HEADER}${projection === "paraboloid" ? "#define PARABOLOID\n" : ""}`;
+}
 
 /// Vertices of a row of the texture that holds irradiance.
 export const IRRADIANCE_ROW = 1024;
@@ -79,6 +86,21 @@ struct FacePoint {
   vec2 st;
 };
 
+#ifdef PARABOLOID
+// The front map, around +Z, is face 0, the back map face 1.
+FacePoint facePoint(vec3 d) {
+  float size = max(length(d) + abs(d.z), 1e-30);
+  return FacePoint(d.z >= 0.0 ? 0.0 : 1.0, 0.5 + 0.5 * vec2(d.x, -d.y) / size);
+}
+
+// Length of the derivative of (x, y) / (|d| + |z|), in faces.
+float faceLength(vec3 d, vec3 change) {
+  float range = max(length(d), 1e-30);
+  float size = range + abs(d.z);
+  float growth = dot(d, change) / range + (d.z < 0.0 ? -change.z : change.z);
+  return 0.5 * length(change.xy - d.xy * (growth / size)) / size;
+}
+#else
 FacePoint facePoint(vec3 d) {
   vec3 a = abs(d);
   if (a.x >= a.y && a.x >= a.z) {
@@ -91,13 +113,6 @@ FacePoint facePoint(vec3 d) {
   }
   vec2 st = vec2(d.z > 0.0 ? d.x : -d.x, -d.y) / a.z;
   return FacePoint(d.z < 0.0 ? 5.0 : 4.0, 0.5 + 0.5 * st);
-}
-
-// Where a level lies in a layer (layerPlace in atlas.ts), and a point of the face on it.
-vec2 levelPoint(float size, float level, vec2 st) {
-  float n = max(floor(size * exp2(-level) + 0.5), 1.0);
-  vec2 corner = level < 0.5 ? vec2(0.0) : vec2(size + 2.0, size - 2.0 * n + 2.0 * (level - 1.0));
-  return (corner + 1.0 + clamp(st, 0.0, 1.0) * n) * uLayer;
 }
 
 float faceLength(vec3 d, vec3 change) {
@@ -118,6 +133,14 @@ float faceLength(vec3 d, vec3 change) {
     onFace.z = 0.0;
   }
   return 0.5 * length(onFace) / max(major, 1e-30);
+}
+#endif
+
+// Where a level lies in a layer (layerPlace in atlas.ts), and a point of the face on it.
+vec2 levelPoint(float size, float level, vec2 st) {
+  float n = max(floor(size * exp2(-level) + 0.5), 1.0);
+  vec2 corner = level < 0.5 ? vec2(0.0) : vec2(size + 2.0, size - 2.0 * n + 2.0 * (level - 1.0));
+  return (corner + 1.0 + clamp(st, 0.0, 1.0) * n) * uLayer;
 }
 
 struct Taps {
@@ -142,6 +165,20 @@ Taps tapsOf(vec3 d, vec3 ddx, vec3 ddy, float size) {
   taps.pairs = int(ceil(0.5 * n));
   taps.step = taps.pairs == 1 ? 0.5 * (n - 1.25) / 0.75 : 1.0 / n;
   return taps;
+}
+
+int tapCount(Taps taps) {
+  return max(2 * taps.pairs, 1);
+}
+
+// Direction of a tap, and its share of the lookup.
+vec3 tapDirection(Taps taps, vec3 d, int tap, out float weight) {
+  weight = 1.0;
+  if (taps.pairs == 0) return d;
+  int pair = tap >> 1;
+  float offset = (float(pair) + 0.5) * taps.step;
+  weight = (pair + 1 < taps.pairs ? 1.0 : 0.5 * (taps.n - 2.0 * float(taps.pairs - 1))) / taps.n;
+  return d + ((tap & 1) == 0 ? offset : -offset) * taps.longer;
 }
 
 vec3 readRadiance(vec3 d, float level, float size, float layer) {
@@ -206,11 +243,11 @@ vec3 leave(int shape, vec3 p, vec3 d, vec3 centre, mat3 proxyFromWorld, vec3 hal
 }
 `;
 
-/// `shells` of the part and `nodes` that are blended are constants of the program.
-export function meshFragment(shells: number, nodes: number): string {
-  return `${HEADER}
+/// `shells` of the part and the number of samples that are `mixed`, the static set among them, are constants of the program.
+export function meshFragment(shells: number, mixed: number, projection: Projection): string {
+  return `${mapHeader(projection)}
 #define SHELLS ${shells}
-#define NODES ${nodes}
+#define MIXED ${mixed}
 in vec3 vPosition;
 in vec3 vNormal;
 in vec3 vIrradiance;
@@ -232,13 +269,12 @@ uniform mat3 uProxyFromWorld[SHELLS + 1];  // scaled, but for boxes
 uniform vec3 uHalfExtent[SHELLS + 1];
 uniform vec3 uOrigin[SHELLS + 1];
 uniform float uSize[SHELLS + 1];
-uniform float uShellOn[SHELLS];
-uniform float uRadianceLayer[SHELLS * NODES];
-uniform float uAlphaLayer[SHELLS * NODES];  // below 0: opaque
-uniform float uWeight[NODES];
+uniform float uShellOn[SHELLS];  // 0: not drawn, or not on these triangles
+uniform float uRadianceLayer[SHELLS * MIXED];
+uniform float uAlphaLayer[SHELLS * MIXED];  // below 0: opaque
+uniform float uMixture[MIXED];  // shares, which sum to 1
 uniform float uStaticLayer;
-uniform float uPem;  // share of the PEM in the mixture with the static map
-uniform bool uStacked;  // false: the last shell alone
+uniform bool uCaptured;  // the captured map instead of the PEM
 
 uniform int uFresnel;  // 0: constant, 1: Schlick, 2: dielectric, 3: conductor, 4: none, 5: no mirror
 uniform vec3 uR0;
@@ -339,23 +375,17 @@ vec4 readShell(int shell, vec3 p, vec3 r, vec3 pdx, vec3 rdx, vec3 pdy, vec3 rdy
   vec3 ddy = lookupDirection(shell, p + pdy, r + rdy) - d;
   float size = uSize[shell];
   Taps taps = tapsOf(d, ddx, ddy, size);
-  int count = max(2 * taps.pairs, 1);
+  int count = tapCount(taps);
   vec4 sum = vec4(0.0);
   for (int tap = 0; tap < count; ++tap) {
-    float weight = 1.0;
-    vec3 place = d;
-    if (taps.pairs > 0) {
-      int pair = tap >> 1;
-      float offset = (float(pair) + 0.5) * taps.step;
-      place += ((tap & 1) == 0 ? offset : -offset) * taps.longer;
-      weight = (pair + 1 < taps.pairs ? 1.0 : 0.5 * (taps.n - 2.0 * float(taps.pairs - 1))) / taps.n;
-    }
+    float weight;
+    vec3 place = tapDirection(taps, d, tap, weight);
     if (shell == SHELLS) {
       sum += weight * vec4(readRadiance(place, taps.level, size, uStaticLayer), 1.0);
       continue;
     }
-    for (int node = 0; node < NODES; ++node) {
-      float share = weight * uWeight[node];
+    for (int node = 0; node < MIXED; ++node) {
+      float share = weight * uMixture[node];
       if (share <= 0.0) continue;
       sum.rgb += share * readRadiance(place, taps.level, size, uRadianceLayer[node * SHELLS + shell]);
       float alpha = uAlphaLayer[node * SHELLS + shell];
@@ -412,17 +442,16 @@ void main() {
   }
 
   vec3 light = vec3(0.0);
-  if (uPem > 0.0) {
+  if (uCaptured) {
+    light = readShell(SHELLS, vPosition, r, pd[0], rd[0], pd[1], rd[1]).rgb;
+  } else {
     float through = 1.0;
-    for (int shell = uStacked ? 0 : SHELLS - 1; shell < SHELLS; ++shell) {
-      vec4 layer = uShellOn[shell] * readShell(shell, vPosition, r, pd[0], rd[0], pd[1], rd[1]);
+    for (int shell = 0; shell < SHELLS; ++shell) {
+      if (uShellOn[shell] == 0.0) continue;
+      vec4 layer = readShell(shell, vPosition, r, pd[0], rd[0], pd[1], rd[1]);
       light += through * layer.rgb;
       through *= 1.0 - layer.a;
     }
-  }
-  if (uPem < 1.0) {
-    vec3 captured = readShell(SHELLS, vPosition, r, pd[0], rd[0], pd[1], rd[1]).rgb;
-    light = mix(captured, light, uPem);
   }
   vec3 r0 = uR0 * (uColorsTint ? vColor : vec3(1.0));
   if (uTextured.y) r0 *= texture(uReflectanceTexture, uReflectanceFromUv * vec3(vUv, 1.0)).rgb;
@@ -445,7 +474,8 @@ void main() {
 `;
 
 /// Surroundings behind the object.
-export const BACKGROUND_FRAGMENT = `${HEADER}
+export function backgroundFragment(projection: Projection): string {
+  return `${mapHeader(projection)}
 in vec2 vUv;
 out vec4 oColour;
 ${READS}
@@ -478,6 +508,7 @@ void main() {
   oColour = vec4(readRadiance(h, taps.level, uSize, uStaticLayer), 0.0);
 }
 `;
+}
 
 /// A ray-traced picture, fitted into the view.
 export const STILL_FRAGMENT = `${HEADER}

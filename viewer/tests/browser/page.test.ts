@@ -236,13 +236,8 @@ describe("what is missing or damaged is said in a sentence", () => {
     ["a damaged description", "manifest.json", Buffer.from("{"), /manifest\.json is damaged/],
     ["a missing mesh", "mesh.bin.gz", null, /mesh\.bin\.gz could not be loaded/],
     ["a damaged mesh", "mesh.bin.gz", Buffer.from("no gzip"), /mesh's file is damaged/],
-    ["a missing map", "samples/00001/0.0.webp", null, /samples\/00001\/0\.0\.webp could not be loaded/],
-    [
-      "a damaged map",
-      "samples/00001/0.0.webp",
-      Buffer.from("no image"),
-      /samples\/00001\/0\.0\.webp is damaged/,
-    ],
+    ["a missing map", "samples/00001/0.webp", null, /samples\/00001\/0\.webp could not be loaded/],
+    ["a damaged map", "samples/00001/0.webp", Buffer.from("no image"), /samples\/00001\/0\.webp is damaged/],
     [
       "an image that the browser cannot show",
       "probe.webp",

@@ -3,6 +3,7 @@ import {
   assembleAlpha,
   assembleRadiance,
   assemblyOf,
+  atlasSize,
   layerPlace,
   layerSize,
   levelCount,
@@ -93,11 +94,11 @@ describe("a layer", () => {
     const size = 4;
     const pixels = new Uint8Array(4 * 144);
     for (let i = 0; i < 144; ++i) pixels[4 * i] = i;
-    const alpha = assembleAlpha(pixels, size);
-    const { width, height } = assemblyOf(size);
+    const alpha = assembleAlpha(pixels, size, "cube");
+    const { width, height } = assemblyOf(size, "cube");
     for (let level = 0; level < 3; ++level) {
       const n = size >> level;
-      const from = sourcePlace(size, level);
+      const from = sourcePlace(size, level, "cube");
       const to = layerPlace(size, level);
       for (let face = 0; face < 6; ++face) {
         const at = (row: number, column: number) =>
@@ -112,10 +113,36 @@ describe("a layer", () => {
     }
   });
 
+  test("of a paraboloid has each texel, and around it the last ones again", () => {
+    const size = 4;
+    const { width: columns, height: rows } = atlasSize(size, "paraboloid");
+    const pixels = new Uint8Array(4 * columns * rows);
+    for (let i = 0; i < columns * rows; ++i) pixels[4 * i] = i;
+    const alpha = assembleAlpha(pixels, size, "paraboloid");
+    const { width, height, corners } = assemblyOf(size, "paraboloid");
+    expect(alpha.length).toBe(2 * width * height);
+    expect(corners.length).toBe(0);
+    for (let level = 0; level < 3; ++level) {
+      const n = size >> level;
+      const from = sourcePlace(size, level, "paraboloid");
+      const to = layerPlace(size, level);
+      for (let face = 0; face < 2; ++face) {
+        for (let row = -1; row <= n; ++row) {
+          for (let column = -1; column <= n; ++column) {
+            const inside = (i: number) => Math.min(Math.max(i, 0), n - 1);
+            const place = (from.y + inside(row)) * columns + from.x + face * n + inside(column);
+            const at = (face * height + to.y + 1 + row) * width + to.x + 1 + column;
+            expect(alpha[at]).toBe(place);
+          }
+        }
+      }
+    }
+  });
+
   test("of one colour is that colour everywhere, borders and corners included", () => {
     const table = radianceTable({ low: -7, high: 4, epsilon: 2 ** -7 });
-    const layers = assembleRadiance(new Uint8Array(4 * 24 * 24).fill(128), 8, table);
-    const { source, corners } = assemblyOf(8);
+    const layers = assembleRadiance(new Uint8Array(4 * 24 * 24).fill(128), 8, "cube", table);
+    const { source, corners } = assemblyOf(8, "cube");
     const expected = packSharedExponent(table[128], table[128], table[128]);
     for (let i = 0; i < source.length; ++i) if (source[i] >= 0) expect(layers[i]).toBe(expected);
     for (let i = 0; i < corners.length; i += 4) expect(layers[corners[i]]).toBe(expected);

@@ -1,4 +1,4 @@
-"""Radiance as 8-bit logarithms, and the atlas that holds all levels of a cube map (spec section 10)."""
+"""Radiance as 8-bit logarithms, and the atlas that holds all levels of a map (spec section 10)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mirrorbake.pem.pyramid import FACES
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.pyramid import Projection
 
 STOPS_BELOW_BRIGHT = 9
 """Radiance that is told from black, in powers of two below what 99 % of the texels stay below."""
@@ -58,32 +63,52 @@ class RadianceCode:
         return radiance
 
 
-def atlas_shape(size: int) -> tuple[int, int]:
-    """Rows and columns of the atlas of all levels of a cube map with `size`² texels a face.
+FACES_IN_A_ROW = {"cube": 3, "paraboloid": 2}
+"""Of a level in an atlas, by the projection of the maps."""
 
-    >>> atlas_shape(256)
-    (768, 768)
-    >>> atlas_shape(1)
-    (2, 3)
+
+def atlas_shape(size: int, projection: Projection = "cube") -> tuple[int, int]:
+    """Rows and columns of the atlas of all levels of a map with `size`² texels a face.
+
+    >>> atlas_shape(256), atlas_shape(256, "paraboloid")
+    ((768, 768), (384, 512))
+    >>> atlas_shape(1), atlas_shape(1, "paraboloid")
+    ((2, 3), (1, 2))
     """
-    return (2 * size + (size if size > 1 else 0), 3 * size)
+    across = FACES_IN_A_ROW[projection]
+    down = FACES[projection] // across
+    return (down * (size + size // 2), across * size)
 
 
-def level_place(size: int, level: int) -> tuple[int, int]:
+def level_place(size: int, level: int, projection: Projection = "cube") -> tuple[int, int]:
     """Row and column of the top left texel of a level in the atlas.
 
     The finest level is on top; the others stand side by side below it, each half as wide as the one to its
-    left. A level's faces are three in a row: +X −X +Y over −Y +Z −Z.
+    left. A level's faces are in rows: +X −X +Y over −Y +Z −Z of a cube, front and back of a paraboloid.
 
     >>> [level_place(256, level) for level in range(4)]
     [(0, 0), (512, 0), (512, 384), (512, 576)]
+    >>> [level_place(256, level, "paraboloid") for level in range(4)]
+    [(0, 0), (256, 0), (256, 256), (256, 384)]
     """
     if level == 0:
         return 0, 0
-    return 2 * size, sum(3 * (size >> finer) for finer in range(1, level))
+    across = FACES_IN_A_ROW[projection]
+    down = FACES[projection] // across
+    return down * size, sum(across * (size >> finer) for finer in range(1, level))
 
 
-def to_atlas(pyramid: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
+def _face_places(size: int, projection: Projection) -> Iterator[tuple[int, int, int]]:
+    """Yield side, row and column of every face of every level, as a pyramid has them."""
+    across = FACES_IN_A_ROW[projection]
+    for level in range(size.bit_length()):
+        s = size >> level
+        row, column = level_place(size, level, projection)
+        for face in range(FACES[projection]):
+            yield s, row + (face // across) * s, column + (face % across) * s
+
+
+def to_atlas(pyramid: NDArray[np.uint8], size: int, projection: Projection = "cube") -> NDArray[np.uint8]:
     """Put a pyramid into its atlas.
 
     Parameters
@@ -92,6 +117,8 @@ def to_atlas(pyramid: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
         Shape (texels, C): levels one after the other, the finest first; faces, rows from the top.
     size
         Texels along a side of the finest level, a power of two.
+    projection
+        Of the map.
 
     Returns
     -------
@@ -99,27 +126,20 @@ def to_atlas(pyramid: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
         Shape (rows, columns, C) as `atlas_shape` has it. Texels that belong to no level repeat the last
         texel, so that they cost nothing in a compressed image.
     """
-    rows, columns = atlas_shape(size)
+    rows, columns = atlas_shape(size, projection)
     atlas = np.empty((rows, columns, pyramid.shape[1]), pyramid.dtype)
     atlas[:] = pyramid[-1]
     offset = 0
-    for level in range(size.bit_length()):
-        s = size >> level
-        row, column = level_place(size, level)
-        for face in range(6):
-            top, left = row + (face // 3) * s, column + (face % 3) * s
-            atlas[top : top + s, left : left + s] = pyramid[offset : offset + s * s].reshape(s, s, -1)
-            offset += s * s
+    for s, top, left in _face_places(size, projection):
+        atlas[top : top + s, left : left + s] = pyramid[offset : offset + s * s].reshape(s, s, -1)
+        offset += s * s
     return atlas
 
 
-def from_atlas(atlas: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
+def from_atlas(atlas: NDArray[np.uint8], size: int, projection: Projection = "cube") -> NDArray[np.uint8]:
     """Inverse of `to_atlas`."""
-    faces = []
-    for level in range(size.bit_length()):
-        s = size >> level
-        row, column = level_place(size, level)
-        for face in range(6):
-            top, left = row + (face // 3) * s, column + (face % 3) * s
-            faces.append(atlas[top : top + s, left : left + s].reshape(s * s, -1))
+    faces = [
+        atlas[top : top + s, left : left + s].reshape(s * s, -1)
+        for s, top, left in _face_places(size, projection)
+    ]
     return np.concatenate(faces)

@@ -7,17 +7,29 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mirrorbake import _core
-from mirrorbake.pem.export.map_sets import require_cubes
 from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
+from mirrorbake.pem.pyramid import pyramid_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from mirrorbake import _core
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.opened import OpenedPem
+    from mirrorbake.pem.pyramid import Projection
     from mirrorbake.scene.parameters import ParameterSpace
+
+
+@dataclass(frozen=True)
+class MapEntry:
+    """A map that there is once for every sample, whichever shells read it."""
+
+    name: str
+    size: int
+    """Texels along a side of the finest level."""
+    opaque: bool
+    """Whether it has no α: the last one of its parts."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +39,12 @@ class Shell:
     name: str
     proxy: dict[str, Any]
     """As `mirrorbake.proxy.proxy_to_attributes` returns it."""
-    size: int
-    """Texels along a side of the finest level."""
-    opaque: bool
-    """Whether it has no α: the last one of its part."""
+    map: int
+    """Number of the map that lies on it."""
     moves: bool = False
     """Whether its shape moves with the object."""
+    on_hull: bool = True
+    """Whether triangles on the object's convex hull read it."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +65,15 @@ class ExportSource:
     motion: dict[str, Any] | None
     """How the object moves along the axis `motion`: `to` (metres) and `turn` (degrees about the vertical in
     `pivot`) at 1; None if it stays."""
-    pyramid: Callable[[int, int, int], FloatArray]
-    """`pyramid(sample, part, shell)`: all levels of a map, (texels, 3) or, not opaque, (texels, 4)."""
+    projection: Projection
+    """Of all maps."""
+    maps: tuple[MapEntry, ...]
+    pyramid: Callable[[int, int], FloatArray]
+    """`pyramid(sample, map)`: all levels of a map, (texels, 3) or, not opaque, (texels, 4)."""
+    static_maps: tuple[FloatArray, ...] | None
+    """The static set: the pyramids of all maps, drawn far from the samples; None if there is none."""
+    fade_degrees: float | None
+    """Degrees beyond the samples at which half of what is drawn is the static set."""
     still: Callable[[int], FloatArray]
     """`still(sample)`: the ray-traced picture (H, W, 3) of a sample's view, scene-linear."""
     mesh: ReflectorMesh
@@ -73,15 +92,20 @@ class ExportSource:
 
 
 def export_source(pem: OpenedPem) -> ExportSource:
-    """Look at an opened PEM as the exporters do; raises InputError if its maps are no cubes."""
-    require_cubes(pem.store)
+    """Look at an opened PEM as the exporters do."""
     store, stage = pem.store, pem.stage
     header, built = store.header, stage.built
     parts = tuple(
         Part(
             part.name,
             tuple(
-                Shell(shell.name, shell.proxy, header.map_size, shell is part.shells[-1], shell.moves)
+                Shell(
+                    shell.name,
+                    shell.proxy,
+                    header.map_of(part.name, shell.name),
+                    shell.moves,
+                    shell.polygons == "all",
+                )
                 for shell in part.shells
             ),
         )
@@ -102,14 +126,29 @@ def export_source(pem: OpenedPem) -> ExportSource:
     first = store.read_irradiance()
     changes = first is not None and store.has_irradiance_per_sample
 
-    def pyramid(sample: int, part: int, shell: int) -> FloatArray:
-        return store.read_map(parts[part].name, parts[part].shells[shell].name, sample)
+    readers = {header.map_of(*name): name for name in header.map_names()}
+
+    def pyramid(sample: int, number: int) -> FloatArray:
+        return store.read_map(*readers[number], sample)
+
+    stored = store.read_static_maps()
+    static_maps = None
+    if stored is not None:
+        static_maps = tuple(
+            np.ascontiguousarray(texels[:, : entry.channels])
+            for texels, entry in zip(stored, header.maps, strict=True)
+        )
+    fade = header.static["fade"]
 
     return ExportSource(
         parts=parts,
         space=header.space,
         motion=_motion(header.source.config),
+        projection=header.projection,
+        maps=tuple(MapEntry(entry.name, header.map_size, entry.channels == 3) for entry in header.maps),
         pyramid=pyramid,
+        static_maps=static_maps,
+        fade_degrees=None if fade is None or static_maps is None else fade["degrees"],
         still=lambda sample: store.read_images(sample).beauty,
         mesh=ReflectorMesh(
             positions=built.positions,
@@ -124,7 +163,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
         ),
         materials=materials,
         irradiance=irradiance if changes else None,
-        static=_core.build_cube_pyramid(store.read_capture()),
+        static=pyramid_of(store.read_capture(), header.projection),
         static_proxy=header.static["proxy"] or header.static["infinite"],
         static_size=header.map_size,
         camera=_camera(pem),
@@ -147,6 +186,7 @@ def run_time_attributes(model: _core.RunTimeModel) -> dict[str, Any]:
 
 def _camera(pem: OpenedPem) -> dict[str, Any]:
     cameras = pem.stage.built.cameras
+    azimuths, elevations = cameras.range()
     return {
         "kind": cameras.kind,
         "target": list(cameras.centre),
@@ -154,6 +194,8 @@ def _camera(pem: OpenedPem) -> dict[str, Any]:
         "height": cameras.height,
         "startDegrees": cameras.start,
         "degrees": cameras.degrees,
+        "azimuths": list(azimuths),
+        "elevations": list(elevations),
         "verticalFovDegrees": cameras.fov,
         "aspect": cameras.size[0] / cameras.size[1],
         "pixels": cameras.size[1],

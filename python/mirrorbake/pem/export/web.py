@@ -16,6 +16,7 @@ from mirrorbake import _core
 from mirrorbake.pem.export.images import ImageFormat, linear_codes, probe_image, srgb_codes
 from mirrorbake.pem.export.mesh_file import write_irradiance, write_mesh
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
+from mirrorbake.pem.pyramid import FACES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from mirrorbake.pem.export.source import ExportSource
 
 FORMAT_NAME = "mirrorbake-web"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 MANIFEST_NAME = "manifest.json"
 
 PROBED_SAMPLES = 16
@@ -94,22 +95,29 @@ class WebPem:
         self._makers["poster.avif"] = self._poster
         self._makers["probe" + form.suffix] = lambda: probe
         self._makers["mesh.bin.gz"] = lambda: mesh
-        self._add("static/capture", lambda: to_atlas(code.encode(source.static), source.static_size))
+        self._add(
+            "static/capture",
+            lambda: to_atlas(code.encode(source.static), source.static_size, source.projection),
+        )
         for t in range(len(source.materials.textures)):
             self._add(_texture_name(t), partial(self._texture, t))
         # The sample that is shown first, then outwards from it.
         for i in sorted(range(len(source.space)), key=lambda i: abs(i - self._first)):
             if source.irradiance is not None:
                 self._makers[_irradiance_name(i)] = partial(self._irradiance, i)
-            for p, part in enumerate(source.parts):
-                for s, shell in enumerate(part.shells):
-                    name = _map_name(i, p, s)
-                    self._add(name, partial(self._radiance, i, p, s))
-                    if not shell.opaque:
-                        self._add(name + ".alpha", partial(self._alpha, i, p, s))
+            self._add_maps(f"samples/{i:05d}", partial(source.pyramid, i))
+            if i == self._first and source.static_maps is not None:
+                self._add_maps("static", source.static_maps.__getitem__)
         if options.stills:
             for i in range(len(source.space)):
                 self._add(_still_name(i), partial(self._still, i))
+
+    def _add_maps(self, folder: str, pyramid: Callable[[int], FloatArray]) -> None:
+        """Add the images of all maps of a sample, or of the static set."""
+        for m, entry in enumerate(self._source.maps):
+            self._add(f"{folder}/{m}", partial(self._radiance, pyramid, m))
+            if not entry.opaque:
+                self._add(f"{folder}/{m}.alpha", partial(self._alpha, pyramid, m))
 
     def _add(self, name: str, pixels: Callable[[], NDArray[np.uint8]]) -> None:
         form, exact = self._options.format, ImageFormat(exact=True)
@@ -120,14 +128,13 @@ class WebPem:
     def _poster(self) -> bytes:
         return ImageFormat(exact=False, quality=70).encode(display_codes(self._source.still(self._first)))
 
-    def _radiance(self, sample: int, part: int, shell: int) -> NDArray[np.uint8]:
-        pyramid = self._source.pyramid(sample, part, shell)
-        return to_atlas(self._code.encode(pyramid[:, :3]), self._source.parts[part].shells[shell].size)
+    def _radiance(self, pyramid: Callable[[int], FloatArray], number: int) -> NDArray[np.uint8]:
+        codes = self._code.encode(pyramid(number)[:, :3])
+        return to_atlas(codes, self._source.maps[number].size, self._source.projection)
 
-    def _alpha(self, sample: int, part: int, shell: int) -> NDArray[np.uint8]:
-        pyramid = self._source.pyramid(sample, part, shell)
-        alpha = np.rint(np.clip(pyramid[:, 3:4], 0.0, 1.0) * 255.0).astype(np.uint8)
-        return to_atlas(alpha, self._source.parts[part].shells[shell].size)[..., 0]
+    def _alpha(self, pyramid: Callable[[int], FloatArray], number: int) -> NDArray[np.uint8]:
+        alpha = np.rint(np.clip(pyramid(number)[:, 3:4], 0.0, 1.0) * 255.0).astype(np.uint8)
+        return to_atlas(alpha, self._source.maps[number].size, self._source.projection)[..., 0]
 
     def _texture(self, number: int) -> NDArray[np.uint8]:
         texture = self._source.materials.textures[number]
@@ -172,47 +179,50 @@ class WebPem:
             },
             "poster": {"file": "poster.avif", "type": "image/avif"},
             "mesh": {"file": "mesh.bin.gz", **mesh},
+            "projection": source.projection,
+            "maps": [
+                {"name": entry.name, "size": entry.size, "opaque": entry.opaque} for entry in source.maps
+            ],
             "parts": [
                 {
                     "name": part.name,
                     "shells": [
                         {
-                            "name": s.name,
-                            "size": s.size,
-                            "opaque": s.opaque,
-                            "proxy": s.proxy,
-                            "moves": s.moves,
+                            "name": shell.name,
+                            "map": shell.map,
+                            "proxy": shell.proxy,
+                            "moves": shell.moves,
+                            "onHull": shell.on_hull,
                         }
-                        for s in part.shells
+                        for shell in part.shells
                     ],
                 }
                 for part in source.parts
             ],
-            "static": {"image": "static/capture", "size": source.static_size, "proxy": source.static_proxy},
+            "static": {
+                "image": "static/capture",
+                "size": source.static_size,
+                "proxy": source.static_proxy,
+                "maps": None if source.static_maps is None else self._map_files("static"),
+                "fadeDegrees": source.fade_degrees,
+            },
             "samples": [self._sample(i) for i in range(len(source.space))],
             "first": self._first,
         }
 
     def _sample(self, i: int) -> dict[str, Any]:
-        maps = [
-            [
-                {"radiance": name, "alpha": None if shell.opaque else name + ".alpha"}
-                for s, shell in enumerate(part.shells)
-                for name in [_map_name(i, p, s)]
-            ]
-            for p, part in enumerate(self._source.parts)
-        ]
-        still = _still_name(i) if self._options.stills else None
         return {
             "parameter": list(self._source.space.sample(i)),
-            "maps": maps,
-            "still": still,
+            "maps": self._map_files(f"samples/{i:05d}"),
+            "still": _still_name(i) if self._options.stills else None,
             "irradiance": None if self._source.irradiance is None else _irradiance_name(i),
         }
 
-
-def _map_name(sample: int, part: int, shell: int) -> str:
-    return f"samples/{sample:05d}/{part}.{shell}"
+    def _map_files(self, folder: str) -> list[dict[str, str | None]]:
+        return [
+            {"radiance": f"{folder}/{m}", "alpha": None if entry.opaque else f"{folder}/{m}.alpha"}
+            for m, entry in enumerate(self._source.maps)
+        ]
 
 
 def _material(material: Material) -> dict[str, Any]:
@@ -281,9 +291,10 @@ def _code_of(source: ExportSource) -> RadianceCode:
     probed = np.unique(np.linspace(0, count - 1, min(count, PROBED_SAMPLES)).round().astype(int))
     bright, largest = [], float(source.static.max())
     for i in probed:
-        for p, part in enumerate(source.parts):
-            for s, shell in enumerate(part.shells):
-                finest = source.pyramid(int(i), p, s)[: 6 * shell.size * shell.size, :3]
-                bright.append(float(np.percentile(finest[::7], 99.0)))
-                largest = max(largest, float(finest.max()))
+        for m, entry in enumerate(source.maps):
+            finest = source.pyramid(int(i), m)[: FACES[source.projection] * entry.size**2, :3]
+            bright.append(float(np.percentile(finest[::7], 99.0)))
+            largest = max(largest, float(finest.max()))
+    for pyramid in source.static_maps or ():
+        largest = max(largest, float(pyramid[:, :3].max()))
     return RadianceCode.for_range(float(np.median(bright)), largest)

@@ -40,7 +40,26 @@ void bind_pem(nb::module_& m) {
                   "-> None"),
           "texels: float32 (texels, 4), premultiplied RGBA, or (texels, 3), opaque. triangles: uint8, 0 for "
           "each "
-          "triangle of\nthe reflector that the shell leaves out, or None if it covers all.");
+          "triangle of\nthe reflector that the shell leaves out, or None if it covers all.")
+      .def_ro("proxy", &OwnedShellMap::proxy)
+      .def_ro("topology", &OwnedShellMap::topology)
+      .def_prop_ro(
+          "texels",
+          [](nb::handle self) {
+            const OwnedShellMap& map = nb::cast<const OwnedShellMap&>(self);
+            const std::size_t shape[2] = {map.texels.shape(0), map.texels.shape(1)};
+            return nb::ndarray<nb::numpy, const float>(map.texels.data(), 2, shape, self);
+          },
+          "(texels, 3) or (texels, 4), read-only.")
+      .def_prop_ro(
+          "triangles",
+          [](nb::handle self) -> std::optional<nb::ndarray<nb::numpy, const std::uint8_t>> {
+            const OwnedShellMap& map = nb::cast<const OwnedShellMap&>(self);
+            if (!map.triangles) return std::nullopt;
+            const std::size_t shape[1] = {map.triangles->size()};
+            return nb::ndarray<nb::numpy, const std::uint8_t>(map.triangles->data(), 1, shape, self);
+          },
+          "uint8, 0 for those that the shell leaves out, read-only; None: it covers all.");
 
   m.def(
       "render_reflector",

@@ -1844,6 +1844,22 @@ class ShellMap:
         the reflector that the shell leaves out, or None if it covers all.
         """
 
+    @property
+    def proxy(self) -> Proxy: ...
+
+    @property
+    def topology(self) -> TexelTopology: ...
+
+    @property
+    def texels(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """(texels, 3) or (texels, 4), read-only."""
+
+    @property
+    def triangles(self) -> Annotated[NDArray[numpy.uint8], dict(writable=False)] | None:
+        """
+        uint8, 0 for those that the shell leaves out, read-only; None: it covers all.
+        """
+
 def render_reflector(samples: SurfaceSamples, parts: Sequence[Sequence[ShellMap]], diffuse: numpy.typing.NDArray[numpy.float32] | None = None, run_time: RunTimeModel = ...) -> numpy.typing.NDArray[numpy.float32]:
     """
     Draws the reflector from its maps: (L0 + (1 - a0)(L1 + ...)) F + D per sample, averaged over the pixel.

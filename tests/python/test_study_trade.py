@@ -10,12 +10,16 @@ import pytest
 from typer.testing import CliRunner
 
 from mirrorbake import _core
+from mirrorbake.bake.bake import bake
 from mirrorbake.commands.main import app
 from mirrorbake.errors import InputError, OptionError
+from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.pyramid import join_pyramid, split_pyramid
 from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.study.trade import maps, show
 from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of
+from mirrorbake.study.trade.drawing import FILTERS, Drawing, draw_samples
 from mirrorbake.study.trade.study import STUDY_NAME, Study, advice, study
 from mirrorbake.study.trade.trial import Trial, overridden
 
@@ -24,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-SCENE = {
+SCENE: dict[str, Any] = {
     "reflector": {"object": "teapot", "subdivisions": 4},
     "views": {"count": 9, "degrees": 8.0, "start": 20.0, "size": [64, 48]},
     "layers": {"local": True, "hull_split": True, "diffuse": False},
@@ -32,6 +36,10 @@ SCENE = {
     "trace": {"samples": 8, "depth": 1, "indirect": "none"},
     "auto": {"quality": "draft"},
 }
+
+
+DECIDED = {"trace.noise": 0.0, "infer.neighbours": 0.0, "infer.passes": 1}
+"""What a plan decides, and axes are about."""
 
 
 def pyramid(channels: int, size: int = 16, seed: int = 1) -> NDArray[np.float32]:
@@ -94,31 +102,118 @@ def test_black_maps_stay_black(storage: maps.Storage) -> None:
 
 
 def test_every_axis_starts_with_the_scenes_own_choice() -> None:
-    config = parse_config(SCENE, "scene")
-    axes = axes_of(config)
+    config = overridden(parse_config(SCENE, "scene"), DECIDED)
+    axes = axes_of(prepare_stage(config))
     assert [axis.name for axis in axes] == [name for name in AXIS_NAMES if name in {a.name for a in axes}]
-    assert {axis.name for axis in axes} == set(AXIS_NAMES)
+    # A footprint of their own have lookups of layers that are fitted by themselves alone.
+    assert {axis.name for axis in axes} == set(AXIS_NAMES) - {"footprint"}
     for axis in axes:
-        assert axis.settings[0].overrides == {}
+        assert axis.settings[0].overrides == {} or axis.name == "fit"
         assert len({setting.label for setting in axis.settings}) == len(axis.settings)
         for setting in axis.settings:
             changed = overridden(config, setting.overrides)
-            assert (changed == config) == (setting.overrides == {})
+            is_own = setting is axis.settings[0]
+            altered = changed != config or setting.drawing != Drawing() or setting.levels or setting.storage
+            assert bool(altered) != is_own
     assert [s.label for s in axes[0].settings] == ["16", "4", "8", "32"]
 
 
-def test_a_mesh_has_no_parts_and_one_view_no_spacing() -> None:
-    scene = {**SCENE, "reflector": {"mesh": "cat.obj"}, "views": {"count": 1}}
-    names = {axis.name for axis in axes_of(parse_config(scene, "scene"))}
-    assert not {"parts", "spacing", "blending"} & names
+def test_a_mesh_has_no_parts_and_one_view_no_spacing(tmp_path: Path) -> None:
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    scene = {**SCENE, "reflector": {"mesh": str(tmp_path / "flat.obj")}, "views": {"count": 1}}
+    names = {axis.name for axis in axes_of(prepare_stage(parse_config(scene, "scene")))}
+    assert not {"parts", "spacing", "blending", "shared"} & names
 
 
 def test_spacing_keeps_the_middle_of_the_arc() -> None:
     config = parse_config(SCENE, "scene")
-    spacing = next(axis for axis in axes_of(config) if axis.name == "spacing")
+    spacing = next(axis for axis in axes_of(prepare_stage(config)) if axis.name == "spacing")
     for setting in spacing.settings:
         views = overridden(config, setting.overrides).views
         assert views.start + 0.5 * views.degrees == pytest.approx(24.0)
+
+
+# Drawing
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> OpenedPem:
+    folder = tmp_path_factory.mktemp("drawn") / "pem"
+    glass = {"fresnel": "dielectric", "ior": 1.5, "albedo": 0.3}
+    scene = {**SCENE, "material": glass, "layers": {}, "views": {**SCENE["views"], "count": 2}}
+    config = parse_config(scene, "scene")
+    bake(config, folder)
+    return open_pem(folder)
+
+
+def picture(pem: OpenedPem, **drawing: Any) -> NDArray[np.float32]:
+    point = (0.0,)
+    samples = pem.stage.visibility(point, pem.run_time.places)
+    eye = pem.stage.built.cameras.camera(point).eye
+    return draw_samples(pem, point, eye, samples, Drawing(**drawing))
+
+
+def test_drawing_as_usual_is_what_the_renderer_draws(drawn: OpenedPem) -> None:
+    samples = drawn.stage.visibility((0.0,), drawn.run_time.places)
+    usual = drawn.run_time.render("pem", (0.0,), samples)
+    assert usual.max() > 0.01
+    # The same lookups, summed in another order.
+    np.testing.assert_allclose(picture(drawn), usual, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("change", [{"filter": "1 to 4 taps"}, {"fresnel": "exact"}])
+def test_the_run_times_own_choice_changes_nothing(drawn: OpenedPem, change: dict[str, Any]) -> None:
+    # Cosines of normals that were bent at the silhouette are rounded otherwise than the tracer's.
+    np.testing.assert_allclose(picture(drawn, **change), picture(drawn), rtol=2e-3, atol=2e-3)
+
+
+def test_approximations_of_fresnel_are_ordered(drawn: OpenedPem) -> None:
+    exact = picture(drawn, fresnel="exact")
+    error = {
+        model: float(np.abs(picture(drawn, fresnel=model) - exact).mean())
+        for model in ("table", "Schlick", "Schlick at vertices")
+    }
+    # A table of 1e-3 is nearer than Schlick's formula, which a coarse mesh's vertices do not hold.
+    assert error["table"] < error["Schlick"] < error["Schlick at vertices"]
+
+
+def test_coordinates_of_vertices_converge_to_those_of_pixels_as_the_mesh_gets_finer() -> None:
+    def degrees_off(subdivisions: int) -> float:
+        scene = {**SCENE, "reflector": {"object": "teapot", "subdivisions": subdivisions}}
+        stage = prepare_stage(parse_config(scene, "scene"))
+        built = stage.built
+        camera = built.cameras.camera((0.0,))
+        samples = stage.tracer.trace_visibility(
+            camera, built.reflector, _core.TraceOptions(), _core.run_time_model("Web").places
+        )
+        box = _core.Proxy.box((0.0, 1.0, 0.0), (2.0, 1.5, 2.0), (0.0, 0.07, 0.0))
+        normals = np.asarray(built.scene.object_mesh(built.reflector).normals)
+        lookups = box.mirror_lookup(camera.eye, built.positions, normals)
+        vertex = _core.with_vertex_lookups(samples, built.positions, built.triangles, lookups)
+        a = np.asarray(vertex.reflection).astype(np.float64)
+        b = box.lookup(np.asarray(samples.position), np.asarray(samples.reflection)).astype(np.float64)
+        sines = np.linalg.norm(np.cross(a, b), axis=1)
+        return float(np.degrees(np.median(np.arctan2(sines, np.sum(a * b, axis=1)))))
+
+    # Of triangles six times smaller: faster than their size falls, if not everywhere by its square.
+    assert degrees_off(24) < 0.1 * degrees_off(4)
+
+
+def test_coordinates_of_vertices_are_another_picture(drawn: OpenedPem) -> None:
+    pixel, vertex = picture(drawn), picture(drawn, coordinates="vertex")
+    share = float(np.abs(vertex - pixel).mean() / pixel.mean())
+    # The coarse mesh's lookups are a degree or two off, those of maps of 16 texels a tenth of a texel.
+    assert 0.0 < share < 0.3
+
+
+def test_filters_differ(drawn: OpenedPem) -> None:
+    pictures = {label: picture(drawn, filter=label).tobytes() for label in FILTERS}
+    assert len(set(pictures.values())) == len(FILTERS)
+
+
+def test_drawings_join_to_one_that_differs_in_all(drawn: OpenedPem) -> None:
+    joined = Drawing.joined([Drawing(nearest=True), Drawing(), Drawing(coordinates="vertex")])
+    assert joined == Drawing(nearest=True, coordinates="vertex")
 
 
 # Fronts and advice
@@ -164,7 +259,7 @@ def test_the_advice_says_what_to_save_and_what_to_pay_for() -> None:
 # A study
 
 
-STUDIED = ["size", "storage", "blending"]
+STUDIED = ["size", "storage", "blending", "coordinates"]
 
 
 @pytest.fixture(scope="module")
@@ -245,12 +340,12 @@ def test_a_study_is_shown_as_tables_a_plot_and_a_section(studied: tuple[Path, St
     folder, result = studied
     single, front = show.tables(result)
     assert single.row_count == 1 + sum(len(axis.settings) - 1 for axis in result.axes)
-    assert front.row_count == len(result.front("bytes_per_degree")) + len(result.front("bake_s"))
+    assert front.row_count == sum(len(result.front(cost)) for cost in show.SHOWN_COSTS)
     show.plot(result, tmp_path / "study.png")
     pixels, _ = _core.load_image(str(tmp_path / "study.png"))
     assert pixels.shape[1] > 1000
     page = show.section(folder)
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == len(show.SHOWN_COSTS) == 3
     assert "What the choices cost" in page
     assert show.section(tmp_path) == ""
     assert json.loads(json.dumps(show.as_json(result)))["trials"][0]["settings"] == {}

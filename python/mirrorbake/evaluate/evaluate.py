@@ -42,7 +42,7 @@ from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.store import PemStore
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Mapping
     from os import PathLike
 
     from numpy.typing import NDArray
@@ -170,8 +170,20 @@ class SeenView:
 class Onlooker:
     """Looks at a PEM from any view: reference and contenders.
 
-    References are kept in the folder `references`, by default beside the PEM; `only` these contenders look;
-    new references get a `margin` in dB.
+    Parameters
+    ----------
+    pem
+        The PEM.
+    references
+        The folder in which references are kept; None: beside the PEM.
+    only
+        Names of the contenders that look.
+    margin
+        dB that new references get to spare.
+    contenders
+        Instead of the PEM's own.
+    run_times
+        How they are drawn: some of `RUN_TIMES`.
     """
 
     def __init__(
@@ -180,16 +192,21 @@ class Onlooker:
         references: Path | None = None,
         only: Collection[str] = CONTENDERS,
         margin: float = MARGIN_DECIBELS,
+        *,
+        contenders: Mapping[str, Contender] | None = None,
+        run_times: Collection[str] = tuple(RUN_TIMES),
     ) -> None:
         self.pem = pem
+        self._run_times = run_times
         self._margin = margin
         self.cache = ReferenceCache(
             references or pem.store.directory / REFERENCES_NAME,
             pem.store.header.source,
             pem.store.header.plan.depth,
         )
+        found = contenders_of(pem) if contenders is None else contenders
         self.contenders: dict[str, Contender] = {
-            name: contender for name, contender in contenders_of(pem).items() if name in only
+            name: contender for name, contender in found.items() if name in only
         }
 
     def look(self, view: View) -> SeenView | None:
@@ -200,7 +217,7 @@ class Onlooker:
             return None
         frame = Frame(self.pem, view, window)
         pictures = {
-            name: {run_time: contender.render(frame, run_time) for run_time in RUN_TIMES}
+            name: {run_time: contender.render(frame, run_time) for run_time in self._run_times}
             for name, contender in self.contenders.items()
         }
         images = [image for row in pictures.values() for image in row.values()]

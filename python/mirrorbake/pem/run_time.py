@@ -171,13 +171,15 @@ class RunTime:
         array
             Radiance (H, W, 3), the mean over the samples that see the reflector; 0 where there are none.
         """
+        return self.render_parts(self.parts_of(contender, point, away), samples, point, model)
+
+    def parts_of(self, contender: str, point: PointLike, away: float = 0.0) -> list[list[_core.ShellMap]]:
+        """Return the shells of all parts as `render` draws them: front to back, blended, where they are."""
         if contender == "pem":
-            parts = self._pem_parts(point, away)
-        elif contender == "static_set":
-            parts = self._shells(self._static_texels, point)
-        else:
-            parts = self._static_parts("infinite" if contender == "static_infinite" else "proxy")
-        return self.render_parts(parts, samples, point, model)
+            return self._pem_parts(point, away)
+        if contender == "static_set":
+            return self._shells(self._static_texels, point)
+        return self._static_parts("infinite" if contender == "static_infinite" else "proxy")
 
     def render_parts(
         self,
@@ -187,12 +189,17 @@ class RunTime:
         model: _core.RunTimeModel | None = None,
     ) -> FloatArray:
         """Draw the reflector from maps of each part, with the diffuse layer of a point; as `render`."""
-        diffuse, irradiance = None, self._diffuse_at(point)
-        if irradiance is not None:
-            diffuse = _core.diffuse_from_irradiance(samples, self.triangles, irradiance)
+        diffuse = self.diffuse_at(samples, point)
         image = _core.render_reflector(samples, parts, diffuse, model or self._options)
         coverage = image[..., 3:]
         return np.divide(image[..., :3], coverage, out=np.zeros_like(image[..., :3]), where=coverage > 0.0)
+
+    def diffuse_at(self, samples: _core.SurfaceSamples, point: PointLike) -> FloatArray | None:
+        """Return the radiance (n, 3) that the body of samples reflects and emits; None without that layer."""
+        irradiance = self._irradiance_at(point)
+        if irradiance is None:
+            return None
+        return np.asarray(_core.diffuse_from_irradiance(samples, self.triangles, irradiance))
 
     def _pem_parts(self, point: PointLike, away: float) -> list[list[_core.ShellMap]]:
         blend = self._header.space.neighbours(point)
@@ -231,7 +238,7 @@ class RunTime:
         space = self._header.space
         return Pose.of(self._config, space.scene_coordinates(space.point(point)).get("motion", 0.0))
 
-    def _diffuse_at(self, point: PointLike) -> FloatArray | None:
+    def _irradiance_at(self, point: PointLike) -> FloatArray | None:
         if self.store.has_irradiance_per_sample and self._irradiance is not None:
             shares = []
             for index, weight in self._header.space.neighbours(point):

@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mirrorbake import _core
+from mirrorbake.pem.run_time import lookups_of
 from mirrorbake.study.trade import maps
+from mirrorbake.study.trade.drawing import FILTERS, Drawing, fresnel_models, label_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.stage import Stage
 
 LARGEST_MAP = 1024
 FEWEST_SAMPLES, MOST_SAMPLES = 4, 256
@@ -25,8 +29,8 @@ class Setting:
     label: str
     overrides: Mapping[str, Any] = field(default_factory=dict)
     """Keys of the scene file that it sets, such as `maps.size`."""
-    contender: str = "pem"
-    """Which contender of an evaluation draws it."""
+    drawing: Drawing = field(default_factory=Drawing)
+    """How the maps are drawn."""
     levels: maps.Levels | None = None
     """Where the coarser levels of the maps come from; None: as they were inferred."""
     storage: maps.Storage | None = None
@@ -49,13 +53,15 @@ class Axis:
         raise KeyError(label)
 
 
-def axes_of(config: SceneConfig) -> list[Axis]:
+def axes_of(stage: Stage) -> list[Axis]:
     """The axes of a scene in which nothing is "auto" that an axis is about.
 
-    Choices that the scene cannot make have no axis: the teapot alone has parts.
+    Choices that the scene cannot make have no axis: a mesh of one object has no parts.
     """
-    found = [make(config) for make in _AXES]
-    return [axis for axis in found if axis is not None and len(axis.settings) > 1]
+    found = [make(stage.config) for make in _AXES]
+    found += [make(stage) for make in _DRAWN_AXES]
+    axes = [axis for axis in found if axis is not None and len(axis.settings) > 1]
+    return sorted(axes, key=lambda axis: AXIS_NAMES.index(axis.name))
 
 
 def _value(config: SceneConfig, key: str) -> Any:
@@ -64,13 +70,13 @@ def _value(config: SceneConfig, key: str) -> Any:
 
 
 def _of_key(
-    name: str, title: str, key: str, values: Callable[[Any], list[Any]]
+    name: str, title: str, key: str, values: Callable[[Any], list[Any]], fit: str | None = None
 ) -> Callable[..., Axis | None]:
-    """An axis of one key of the scene file: its own value, then the others."""
+    """An axis of one key of the scene file: its own value, then the others; of one way to fit alone."""
 
     def make(config: SceneConfig) -> Axis | None:
         own = _value(config, key)
-        if own is None:
+        if own is None or fit not in (None, config.infer.fit):
             return None
         settings = [Setting(_label(own), {})]
         settings += [Setting(_label(value), {key: value}) for value in values(own) if value != own]
@@ -112,7 +118,7 @@ def _spacing(config: SceneConfig) -> Axis | None:
 def _blending(config: SceneConfig) -> Axis | None:
     if config.views.count < 2:
         return None
-    settings = (Setting("blended"), Setting("nearest", contender="pem_nearest"))
+    settings = (Setting("blended"), Setting("nearest", drawing=Drawing(nearest=True)))
     return Axis("blending", "between samples", settings)
 
 
@@ -122,6 +128,14 @@ def _parts(config: SceneConfig) -> Axis | None:
     other = "joined" if config.reflector.parts == "split" else "split"
     settings = (Setting(config.reflector.parts), Setting(other, {"reflector.parts": other}))
     return Axis("parts", "parts with maps of their own", settings)
+
+
+def _shared(config: SceneConfig) -> Axis | None:
+    if config.reflector.object is None or config.reflector.parts != "split":
+        return None
+    own = config.maps.shared_distant
+    settings = (Setting(_label(own)), Setting(_label(not own), {"maps.shared_distant": not own}))
+    return Axis("shared", "one distant map for all parts", settings)
 
 
 def _shells(config: SceneConfig) -> Axis:
@@ -146,30 +160,80 @@ def _storage(config: SceneConfig) -> Axis:
     return Axis("storage", "storage of texels", tuple(settings))
 
 
+def _fit(config: SceneConfig) -> Axis:
+    display = Setting("the displayed pixel", {"infer.fit": "display"})
+    # Layers by themselves take all samples of a pixel alike.
+    layers = Setting("every layer by itself", {"infer.fit": "layers", "trace.noise": 0.0})
+    own, other = (display, layers) if config.infer.fit == "display" else (layers, display)
+    return Axis("fit", "what maps are fitted to", (Setting(own.label), other))
+
+
+def _filter(stage: Stage) -> Axis:
+    infer = stage.config.infer
+    model = _core.run_time_model(infer.run_time)
+    own = label_of(model if infer.fit == "display" else lookups_of(infer.footprint_scale))
+    settings = [Setting(own), *(Setting(f, drawing=Drawing(filter=f)) for f in FILTERS if f != own)]
+    return Axis("filter", "filter of a lookup", tuple(settings))
+
+
+def _coordinates(stage: Stage) -> Axis | None:
+    built = stage.built
+    if not len(built.scene.object_mesh(built.reflector).normals):
+        return None
+    vertex = Setting("per vertex", drawing=Drawing(coordinates="vertex"))
+    return Axis("coordinates", "where lookups are computed", (Setting("per pixel"), vertex))
+
+
+def _fresnel(stage: Stage) -> Axis | None:
+    built = stage.built
+    first, *others = fresnel_models(stage)
+    if not len(built.scene.object_mesh(built.reflector).normals):
+        others = [model for model in others if model != "Schlick at vertices"]
+    settings = (Setting(first), *(Setting(model, drawing=Drawing(fresnel=model)) for model in others))
+    return Axis("fresnel", "Fresnel reflectance", settings)
+
+
 _SHAPES = ["infinite", "sphere", "box", "ellipsoid"]
 
-_AXES: tuple[Callable[[Any], Axis | None], ...] = (
+_AXES: tuple[Callable[[SceneConfig], Axis | None], ...] = (
     _of_key("size", "texels along a face", "maps.size", _sizes),
     _levels,
     _storage,
+    _of_key("projection", "projection of the maps", "maps.projection", lambda own: ["cube", "paraboloid"]),
     _of_key("geometry", "geometry of the distant map", "maps.distant", lambda own: _SHAPES),
     _shells,
     _parts,
+    _shared,
     _of_key("samples", "samples of a target pixel", "trace.samples", _samples),
+    _of_key("noise", "noise that a target's pixel may have", "trace.noise", lambda own: [0.0, 0.01, 0.02]),
     _spacing,
     _blending,
     _of_key(
-        "footprint", "footprint of a lookup, pixels", "infer.footprint_scale", lambda own: [0.25, 0.5, 1.0]
+        "run_time", "run time", "infer.run_time", lambda own: ["Web1", "Web", "Reference"], fit="display"
+    ),
+    _fit,
+    _of_key(
+        "neighbours", "weight of neighbours' views", "infer.neighbours", lambda own: [0.0, 0.3], "display"
+    ),
+    _of_key("passes", "passes of the fit", "infer.passes", lambda own: [1, 2, 4], fit="display"),
+    _of_key(
+        "footprint",
+        "footprint of a lookup, pixels",
+        "infer.footprint_scale",
+        lambda own: [0.25, 0.5, 1.0],
+        fit="layers",
     ),
     _of_key("smoothness", "λ of smoothness", "infer.smoothness", lambda own: [own / 10, own * 10]),
     _of_key("prior", "what unseen texels fall back to", "infer.prior", lambda own: ["captured", "smooth"]),
     _of_key("prior_weight", "λ of the prior", "infer.prior_weight", lambda own: [own / 10, own * 10]),
-    _of_key("iterations", "iterations at most", "infer.iterations", lambda own: [own // 8, own * 4]),
+    _of_key("iterations", "iterations at most", "infer.iterations", lambda own: [own // 16, own // 4]),
 )
+_DRAWN_AXES: tuple[Callable[[Stage], Axis | None], ...] = (_filter, _coordinates, _fresnel)
 
 AXIS_NAMES = (
-    *("size", "levels", "storage", "geometry", "shells", "parts", "samples", "spacing", "blending"),
-    *("footprint", "smoothness", "prior", "prior_weight", "iterations"),
+    *("size", "levels", "storage", "projection", "geometry", "shells", "parts", "shared"),
+    *("samples", "noise", "spacing", "blending", "run_time", "filter", "coordinates", "fresnel"),
+    *("fit", "neighbours", "passes", "footprint", "smoothness", "prior", "prior_weight", "iterations"),
 )
 """Of all axes, in their order."""
 

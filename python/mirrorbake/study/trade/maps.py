@@ -28,14 +28,19 @@ class Levels:
 
     name: str
     coarser: Callable[[FloatArray, FloatArray], list[FloatArray]]
-    """Levels (6, s, s, C) below the finest, of the finest (6, S, S, C) and a captured pyramid (texels, 3)."""
+    """Levels (F, s, s, C) below the finest, of the finest (F, S, S, C) and a captured pyramid (texels, 3)."""
 
     def apply(self, pyramid: FloatArray, size: int, capture: FloatArray) -> FloatArray:
         """Return a pyramid (texels, C) with its coarser levels made anew."""
-        channels = pyramid.shape[1]
-        finest = pyramid[: 6 * size * size].reshape(6, size, size, channels)
+        channels, faces = pyramid.shape[1], faces_of(len(pyramid), size)
+        finest = pyramid[: faces * size * size].reshape(faces, size, size, channels)
         levels = [finest, *self.coarser(finest, capture)]
         return np.concatenate([level.reshape(-1, channels) for level in levels])
+
+
+def faces_of(texels: int, size: int) -> int:
+    """How many faces a pyramid of so many texels has: 6 of a cube, 2 of dual paraboloids."""
+    return texels // sum(side * side for side in (size, *coarser_sizes(size)))
 
 
 def _decimated(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
@@ -47,7 +52,7 @@ def _decimated(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
 
 
 def _solid_angle(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
-    filtered = EnvMap.from_array(finest, "cube").mips("seamless")
+    filtered = EnvMap.from_array(finest, "cube" if len(finest) == 6 else "dual_paraboloid").mips("seamless")
     return [filtered.level(level) for level in range(1, filtered.levels)]
 
 
@@ -55,10 +60,11 @@ def _captured(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
     if finest.shape[3] != 3:
         # Nothing of the object itself is captured from its centre.
         return _decimated(finest, capture)
-    levels, start = [], 6 * finest.shape[1] ** 2
+    faces = len(finest)
+    levels, start = [], faces * finest.shape[1] ** 2
     for size in coarser_sizes(finest.shape[1]):
-        levels.append(capture[start : start + 6 * size * size].reshape(6, size, size, 3))
-        start += 6 * size * size
+        levels.append(capture[start : start + faces * size * size].reshape(faces, size, size, 3))
+        start += faces * size * size
     return levels
 
 

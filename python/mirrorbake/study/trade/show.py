@@ -26,7 +26,7 @@ COST_TITLES = {
     "bake_s": "seconds of baking per degree of the arc",
     "draw_ms": "milliseconds to draw a frame",
 }
-SHOWN_COSTS = ("bytes_per_degree", "bake_s")
+SHOWN_COSTS = ("bytes_per_degree", "bake_s", "draw_ms")
 OWN = "the scene's own"
 
 
@@ -71,7 +71,10 @@ def tables(result: Study) -> list[Table]:
     )
     single.add_column("choice")
     single.add_column("setting")
-    front = Table(title="The best for their bytes, and the best for their time to bake", title_justify="left")
+    front = Table(
+        title="The best for their bytes, for their time to bake, and for their time to draw",
+        title_justify="left",
+    )
     front.add_column("settings that are not the scene's own", overflow="fold")
     for table in (single, front):
         for heading in HEADINGS:
@@ -89,11 +92,11 @@ def tables(result: Study) -> list[Table]:
 
 
 def plot(result: Study, path: Path) -> None:
-    """Write a PNG: error against bytes and against the time to bake, with the fronts marked."""
+    """Write a PNG: error against bytes, the time to bake and the time to draw, with the fronts marked."""
     style: dict[Any, Any] = {"font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9}
     with mpl.rc_context(style):
-        figure = Figure(figsize=(11, 4.6), layout="constrained")
-        for axes, cost in zip(figure.subplots(1, 2), SHOWN_COSTS, strict=True):
+        figure = Figure(figsize=(15, 4.6), layout="constrained")
+        for axes, cost in zip(figure.subplots(1, len(SHOWN_COSTS)), SHOWN_COSTS, strict=True):
             seen = [trial for trial in result.all if trial.near is not None]
             single = [trial for trial in seen if len(trial.settings) < 2]
             combined = [trial for trial in seen if len(trial.settings) > 1]

@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from mirrorbake import _core
@@ -24,11 +24,12 @@ if TYPE_CHECKING:
 
     from mirrorbake.bake.bake import ProgressReport
     from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.stage import Stage
 
 STUDY_NAME = "study.json"
 STUDIED_VIEWS = 3
 """Maps of a trial: a sample with a neighbour on either side."""
-COMBINATIONS = 16
+COMBINATIONS = 15
 """Tried at most, after the single axes."""
 NOTICEABLE = 0.1
 """dB that a dearer choice has to gain to be on the front: the figures of another seed differ by less."""
@@ -122,12 +123,12 @@ def study(
     report(0, 1, "preparing the scene")
     folder.mkdir(parents=True, exist_ok=True)
     notebook = _Notebook(folder / STUDY_NAME, _identity(config))
-    base_config = _studied(config)
-    chosen = [axis for axis in axes_of(base_config) if not axes or axis.name in axes]
+    stage = _studied(config)
+    chosen = [axis for axis in axes_of(stage) if not axes or axis.name in axes]
     if axes and len(chosen) < len(set(axes)):
         missing = sorted(set(axes) - {axis.name for axis in chosen})
         raise OptionError(f"--axes {missing[0]}: this scene has no such choice")
-    bench = Bench(base_config, folder)
+    bench = Bench(stage.config, folder, stage)
     singles = [{axis.name: setting} for axis in chosen for setting in axis.settings[1:]]
     planned = 1 + len(singles)
     done: list[Trial] = []
@@ -151,23 +152,24 @@ def study(
         notebook.keep(trial)
         return trial
 
-    report(0, planned, "the scene's own choice")
-    base = measure({})
-    if base is None or base.near is None:
-        raise InputError("study: no pixel of the views in the middle of the arc is wholly the object's")
-    done.append(base)
-    for step, settings in enumerate(singles, start=1):
-        report(step, planned, _words(settings))
-        trial = measure(settings)
-        if trial is not None:
-            done.append(trial)
-    promising = _promising(base, chosen, done[1:], combinations)
-    planned += len(promising)
-    for step, settings in enumerate(promising, start=1 + len(singles)):
-        report(step, planned, _words(settings))
-        trial = measure(settings)
-        if trial is not None:
-            done.append(trial)
+    with bench:
+        report(0, planned, "the scene's own choice")
+        base = measure({})
+        if base is None or base.near is None:
+            raise InputError("study: no pixel of the views in the middle of the arc is wholly the object's")
+        done.append(base)
+        for step, settings in enumerate(singles, start=1):
+            report(step, planned, _words(settings))
+            trial = measure(settings)
+            if trial is not None:
+                done.append(trial)
+        promising = _promising(base, chosen, done[1:], combinations)
+        planned += len(promising)
+        for step, settings in enumerate(promising, start=1 + len(singles)):
+            report(step, planned, _words(settings))
+            trial = measure(settings)
+            if trial is not None:
+                done.append(trial)
     report(planned, planned, f"{len(done)} trials")
     result = Study(base, chosen, done[1:], planned - len(notebook.refused), dict(notebook.refused))
     notebook.finish(summary(result))
@@ -178,8 +180,18 @@ def _words(settings: Mapping[str, Setting]) -> str:
     return ", ".join(f"{axis} {setting.label}" for axis, setting in settings.items())
 
 
-def _studied(config: SceneConfig) -> SceneConfig:
-    """The scene with few views in the middle of its arc, and what is "auto" decided."""
+_DECIDED = (
+    *("trace.depth", "trace.samples", "trace.noise", "maps.size", "maps.distant"),
+    *("views.traced", "infer.passes", "infer.neighbours"),
+)
+"""What all trials share of the plan; layers and their parts stay as each trial finds them."""
+
+
+def _studied(config: SceneConfig) -> Stage:
+    """The scene with few views in the middle of its arc, and what is "auto" decided.
+
+    It has no static set, which serves views far from all samples and is the same for all of them.
+    """
     views = config.views
     if views.kind != "arc":
         raise InputError(f"views.kind = {views.kind!r}: a study needs views on an arc")
@@ -192,15 +204,15 @@ def _studied(config: SceneConfig) -> SceneConfig:
             "views.degrees": step * (STUDIED_VIEWS - 1),
         }
         config = overridden(config, overrides)
+    config = overridden(config, {"static.views": 0})
     stage = prepare_stage(config)
     plan = analyze(stage)
     decided = {
-        "trace.depth": plan.depth,
-        "trace.samples": plan.samples,
-        "maps.size": plan.map_size,
-        "maps.distant": plan.value("maps.distant"),
+        decision.key: decision.value
+        for decision in plan.decisions
+        if decision.automatic and decision.key in _DECIDED
     }
-    return overridden(config, decided)
+    return replace(stage, config=overridden(config, decided))
 
 
 def _identity(config: SceneConfig) -> str:
@@ -270,8 +282,8 @@ class _Move:
 
     axis: str
     setting: Setting
-    octaves: tuple[float, float]
-    """Of bytes and of bake time."""
+    octaves: tuple[float, ...]
+    """Of `COSTS`."""
     gain: float
     """dB."""
 
@@ -282,18 +294,14 @@ def _promising(
     """Combinations that the single axes foretell to be on a front.
 
     Axes are taken to act independently: ratios of costs multiply, gains in dB add. Of all combinations of
-    settings that trade something, those on the foretold fronts of bytes and of bake time are tried, evenly
-    over the front.
+    settings that trade something, those on the foretold fronts of `COSTS` are tried, evenly over the fronts.
     """
     options: list[list[_Move]] = []
     for axis in axes:
         moves: list[_Move] = []
         for trial in singles:
             if list(trial.settings) == [axis.name] and trial.near is not None and base.near is not None:
-                ratios = (
-                    log_ratio(trial.bytes_per_degree, base.bytes_per_degree),
-                    log_ratio(trial.bake_s, base.bake_s),
-                )
+                ratios = tuple(log_ratio(getattr(trial, cost), getattr(base, cost)) for cost in COSTS)
                 gain = trial.near - base.near
                 # Worse and no cheaper: no part of any front.
                 if gain > NOTICEABLE or min(ratios) < -0.1:
@@ -309,16 +317,16 @@ def _promising(
         taken = [move for move in choice if move is not None]
         if len(taken) > 1:
             gain = sum(move.gain for move in taken)
-            ratios = (sum(move.octaves[0] for move in taken), sum(move.octaves[1] for move in taken))
+            ratios = tuple(sum(move.octaves[cost] for move in taken) for cost in range(len(COSTS)))
             foretold.append((ratios, gain, {move.axis: move.setting for move in taken}))
     chosen: dict[str, dict[str, Setting]] = {}
-    for cost in range(2):
+    for cost in range(len(COSTS)):
         best, front = -1e9, []
         for ratios, gain, settings in sorted(foretold, key=lambda item: (item[0][cost], -item[1])):
             if gain > best + NOTICEABLE:
                 best = gain
                 front.append((ratios, gain, settings))
-        for _, _, settings in _evenly(front, count // 2):
+        for _, _, settings in _evenly(front, max(count // len(COSTS), 1)):
             chosen.setdefault(_words(settings), settings)
     return list(chosen.values())
 
@@ -342,7 +350,8 @@ def advice(result: Study) -> list[str]:
     base = result.base
     assert base.near is not None
     savings, gains = [], []
-    for cost, noun in (("bytes_per_degree", "the bytes"), ("bake_s", "the time to bake")):
+    nouns = ("the bytes", "the time to bake", "the time to draw")
+    for cost, noun in zip(COSTS, nouns, strict=True):
         for axis in result.axes:
             for trial in result.of_axis(axis.name):
                 if trial.near is None:

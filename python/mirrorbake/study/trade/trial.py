@@ -9,14 +9,19 @@ import time
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from mirrorbake import _core
 from mirrorbake.bake.bake import bake
+from mirrorbake.evaluate.contenders import Contender, main_run_time, run_time_of
 from mirrorbake.evaluate.evaluate import Onlooker
 from mirrorbake.evaluate.metrics import flip
 from mirrorbake.evaluate.places import View, choose_views
-from mirrorbake.pem.opened import OpenedPem, open_pem
+from mirrorbake.pem.opened import OpenedPem
+from mirrorbake.pem.pyramid import FACES, pyramid_of
+from mirrorbake.pem.run_time import RunTime
+from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import Stage, prepare_stage
+from mirrorbake.study.trade.drawing import Drawing, draw, draw_samples
+from mirrorbake.study.trade.kept_traces import KeptTraces
 from mirrorbake.study.trade.maps import packed_bytes
 
 if TYPE_CHECKING:
@@ -29,7 +34,7 @@ if TYPE_CHECKING:
 
 PLACES = ("on", "between", "off_5")
 """From which a trial is looked at."""
-DRAW_REPEATS = 3
+DRAW_REPEATS = 5
 REFERENCE_MARGIN = 10.0
 """dB that references get to spare, so that most better trials are measured against the same ones."""
 
@@ -85,29 +90,51 @@ def overridden(config: SceneConfig, overrides: Mapping[str, Any]) -> SceneConfig
 
 
 class Bench:
-    """Where trials are made: the scene, its tracers and its references.
+    """Where trials are made: the scene, its tracers, what they have traced, and its references.
+
+    To be used as a context: what it leaves in the folder are the references.
 
     Parameters
     ----------
     config
         The scene with few views, in which nothing is "auto" that an axis is about.
     folder
-        Takes the references, and a PEM while it is measured.
+        Takes the references, and PEMs while they are measured.
+    stage
+        The scene, if it has been prepared already.
     """
 
-    def __init__(self, config: SceneConfig, folder: Path) -> None:
+    def __init__(self, config: SceneConfig, folder: Path, stage: Stage | None = None) -> None:
         self.config = config
         self._folder = folder
         self._stages: dict[str, Stage] = {}
+        self._traces = KeptTraces()
+        self._own: tuple[OpenedPem, float] | None = None
+        if stage is not None:
+            self._stages[self._key(config)] = self._traces.keeping(stage)
+
+    def __enter__(self) -> Bench:
+        """Begin."""
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        """Remove the PEMs."""
+        for name in ("own", "trial"):
+            shutil.rmtree(self._folder / name, ignore_errors=True)
+
+    @staticmethod
+    def _key(config: SceneConfig) -> str:
+        data = json.loads(config.model_dump_json())
+        for key in ("samples", "noise"):
+            data["trace"].pop(key)
+        sections = ("reflector", "material", "surroundings", "views", "trace")
+        return json.dumps([data.get(section) for section in sections])
 
     def stage(self, config: SceneConfig) -> Stage:
         """The tracer of a scene, shared by all that are lit and seen alike."""
-        data = json.loads(config.model_dump_json())
-        data["trace"].pop("samples")
-        sections = ("reflector", "material", "surroundings", "views", "trace")
-        key = json.dumps([data.get(section) for section in sections])
+        key = self._key(config)
         if key not in self._stages:
-            self._stages[key] = prepare_stage(config)
+            self._stages[key] = self._traces.keeping(prepare_stage(config))
         return replace(self._stages[key], config=config)
 
     def measure(self, settings: Mapping[str, Setting]) -> Trial:
@@ -119,46 +146,59 @@ class Bench:
             The scene cannot be baked so.
         """
         overrides = {key: value for setting in settings.values() for key, value in setting.overrides.items()}
-        config = overridden(self.config, overrides)
-        directory = self._folder / "trial"
-        shutil.rmtree(directory, ignore_errors=True)
-        try:
-            stage = self.stage(config)
-            bake(config, directory, None, stage)
-            return self._look(open_pem(directory, stage), settings)
-        finally:
-            shutil.rmtree(directory, ignore_errors=True)
+        if not overrides:
+            # What is only drawn or stored otherwise is baked once.
+            if self._own is None:
+                self._own = self._bake(self.config, self._folder / "own")
+            return self._look(*self._own, settings)
+        return self._look(*self._bake(overridden(self.config, overrides), self._folder / "trial"), settings)
 
-    def _look(self, opened: OpenedPem, settings: Mapping[str, Setting]) -> Trial:
+    def _bake(self, config: SceneConfig, directory: Path) -> tuple[OpenedPem, float]:
+        """Bake the samples that are looked at: the PEM, and seconds per sample."""
+        shutil.rmtree(directory, ignore_errors=True)
+        stage = self.stage(config)
+        before = self._traces.saved_s
+        wanted = nodes_looked_at(config)
+        summary = bake(config, directory, None, stage, samples=wanted)
+        store = PemStore.open(directory)
+        timings = [store.read_timings(index) for index in wanted]
+        seconds = sum(t.trace_s + t.build_s + t.solve_s for t in timings)
+        seconds = (seconds + self._traces.saved_s - before) / len(wanted)
+        stage = stage.planned(summary.plan)
+        return OpenedPem(store, stage, RunTime(store, stage.built.triangles)), seconds
+
+    def _look(self, opened: OpenedPem, seconds: float, settings: Mapping[str, Setting]) -> Trial:
         pem, size = _remapped(opened, settings.values())
-        contender = next(
-            (setting.contender for setting in settings.values() if setting.contender != "pem"), "pem"
+        drawing = Drawing.joined(setting.drawing for setting in settings.values())
+        contender = Contender("PEM", lambda frame, run_time: draw(frame, run_time, drawing))
+        onlooker = Onlooker(
+            pem,
+            self._folder / "references",
+            margin=REFERENCE_MARGIN,
+            contenders={"pem": contender},
+            run_times=(main_run_time(pem),),
         )
-        onlooker = Onlooker(pem, self._folder / "references", (contender,), REFERENCE_MARGIN)
         psnr: dict[str, float | None] = {}
         errors: dict[str, float | None] = {}
         ceiling: dict[str, float] = {}
         for view in _views(pem):
             seen = onlooker.look(view)
-            if seen is None or contender not in seen.pictures:
+            if seen is None:
                 continue
-            light, reference = seen.pictures[contender][seen.run_time], seen.reference
+            light, reference = seen.pictures["pem"][seen.run_time], seen.reference
             psnr[view.place] = reference.psnr(light)
             errors[view.place] = flip(
                 reference.images.composite(light), reference.images.beauty, reference.mask
             )
             ceiling[view.place] = reference.ceiling
-        header = pem.store.header
-        count = len(header.space)
-        timings = [pem.store.read_timings(index) for index in range(count)]
-        seconds = sum(t.trace_s + t.build_s + t.solve_s for t in timings) / count
-        views = header.source.config["views"]
+        count = len(pem.store.header.space)
+        views = pem.store.header.source.config["views"]
         per_degree = (count - 1) / abs(views["degrees"]) if count > 1 and views["degrees"] else 1.0
         return Trial(
             settings={axis: setting.label for axis, setting in settings.items()},
             bytes_per_degree=size * per_degree,
             bake_s=seconds * per_degree,
-            draw_ms=_draw_ms(pem),
+            draw_ms=_draw_ms(pem, drawing),
             psnr=psnr,
             flip=errors,
             ceiling=ceiling,
@@ -178,8 +218,8 @@ def _remapped(pem: OpenedPem, settings: Iterable[Setting]) -> tuple[OpenedPem, f
     levels = next((s.levels for s in settings if s.levels is not None), None)
     storage = next((s.storage for s in settings if s.storage is not None), None)
     header = pem.store.header
-    finest = 6 * header.map_size**2
-    capture = _core.build_cube_pyramid(pem.store.read_capture())
+    finest = FACES[header.projection] * header.map_size**2
+    capture = pyramid_of(pem.store.read_capture(), header.projection)
 
     def remap(texels: FloatArray) -> FloatArray:
         if storage is not None:
@@ -188,7 +228,7 @@ def _remapped(pem: OpenedPem, settings: Iterable[Setting]) -> tuple[OpenedPem, f
 
     size = 0
     # A view in the middle stands for all: they show the same scene.
-    index = len(header.space) // 2
+    index = _middle(len(header.space))
     for part, layer in header.map_names():
         texels = pem.store.read_map(part, layer, index)
         stored = texels if levels is None else texels[:finest]
@@ -200,13 +240,25 @@ def _remapped(pem: OpenedPem, settings: Iterable[Setting]) -> tuple[OpenedPem, f
     return replace(pem, run_time=run_time), float(size)
 
 
-def _draw_ms(pem: OpenedPem) -> float:
-    point = pem.space.sample(len(pem.space) // 2)
-    samples = pem.stage.visibility(point)
-    pem.run_time.render("pem", point, samples)
+def _draw_ms(pem: OpenedPem, drawing: Drawing) -> float:
+    point = pem.space.sample(_middle(len(pem.space)))
+    samples = pem.stage.visibility(point, run_time_of(pem, main_run_time(pem)).places)
+    eye = pem.stage.built.cameras.camera(point).eye
+    draw_samples(pem, point, eye, samples, drawing)
     times = []
     for _ in range(DRAW_REPEATS):
         start = time.perf_counter()
-        pem.run_time.render("pem", point, samples)
+        draw_samples(pem, point, eye, samples, drawing)
         times.append(time.perf_counter() - start)
     return 1e3 * min(times)
+
+
+def _middle(count: int) -> int:
+    """Number of the sample that is looked at, of so many along the arc (`choose_views`)."""
+    return (count - 1) // 2
+
+
+def nodes_looked_at(config: SceneConfig) -> list[int]:
+    """Numbers of the samples from whose maps `PLACES` are drawn: the middle one, and those up to the last."""
+    count = config.views.count
+    return list(range(_middle(count), count))

@@ -1,14 +1,25 @@
-"""Prefiltered maps against filtered importance sampling, both against the sum over all texels in float64.
+"""Prefiltered maps against what others have, all against the sum over all texels in float64.
 
-The peer is what cmgen, three.js and Unreal do for every texel, in NumPy: 1024 directions, drawn in proportion
-to the lobe, each read from the mip level that suits its density (Krivanek and Colbert 2008). Its time is that
-of NumPy; its error is that of the method. Errors are the 99th percentile of the relative error over the
-texels looked at. The panorama is a sky of smooth waves and noise with a sun of 1e5 times its radiance,
-2048 × 1024. The time of the sum over all texels is that of a few of them, times their number.
+Peers, in the order of the table:
+
+- that sum itself, in NumPy: its time is that of some texels, times their number;
+- filtered importance sampling, what cmgen, Unreal and older three.js do for every texel, in NumPy: 1024
+  directions, drawn in proportion to the lobe, each read from the mip level that suits its density (Krivanek
+  and Colbert 2008). Its time is that of NumPy; its error is that of the method;
+- a cone of texels, what cmft does for a Phong lobe: the sum, cut where the lobe is 1 % of its peak;
+- skylibs (PyPI), `EnvironmentMap.blur`: a lobe of von Mises and Fisher;
+- three.js (npm), `PMREMGenerator` in headless Chromium, drawn by SwiftShader on the processor. Left out,
+  with a message, where there is no Node.js or no Chromium.
+
+Errors are the 99th percentile of the relative error over the texels looked at. The panorama is a sky of
+smooth waves and noise with a sun of 1e5 times its radiance: 5e4, which half floats still hold.
 """
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import io
 import time
 from functools import partial
 from typing import TYPE_CHECKING
@@ -16,9 +27,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import _three
 from benchmarks._report import Case, require, run, seconds
 from mirrorbake.envmap import EnvMap
-from mirrorbake.prefilter import Prefilter, ggx, ggx_chain, lambert, phong
+from mirrorbake.prefilter import Prefilter, ggx, ggx_chain, lambert, phong, table
 from mirrorbake.projection import texel_directions
 
 if TYPE_CHECKING:
@@ -30,26 +42,27 @@ FloatArray = NDArray[np.float64]
 HEIGHT, LOOKED_AT, SAMPLES = 1024, 50, 1024
 
 
-def panorama() -> EnvMap:
-    d = texel_directions("latlong", 2 * HEIGHT, HEIGHT).astype(np.float64)
-    noise = np.random.default_rng(0).random((HEIGHT, 2 * HEIGHT, 1)) * 0.3
+def panorama(height: int = HEIGHT) -> EnvMap:
+    d = texel_directions("latlong", 2 * height, height).astype(np.float64)
+    noise = np.random.default_rng(0).random((height, 2 * height, 1)) * 0.3
     image = 0.5 + 0.3 * np.sin(5 * d + 1) + noise
     sun = np.array([0.3, 0.6, 0.5]) / np.linalg.norm([0.3, 0.6, 0.5])
-    image[d @ sun > np.cos(np.radians(0.4))] = 1e5
+    image[d @ sun > np.cos(np.radians(0.4))] = 5e4
     return EnvMap.from_array(image.astype(np.float32), "latlong")
 
 
 def all_texels(source: EnvMap, weight: Callable[[FloatArray], FloatArray], axes: FloatArray) -> FloatArray:
     """Weighted means about `axes`, texels at their middles, in float64."""
-    latitude = np.pi * (0.5 - (np.arange(HEIGHT) + 0.5) / HEIGHT)
-    longitude = np.pi * ((np.arange(2 * HEIGHT) + 0.5) / HEIGHT - 1)
+    height = source.layout.height
+    latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)
+    longitude = np.pi * ((np.arange(2 * height) + 0.5) / height - 1)
     lat, lon = np.meshgrid(latitude, longitude, indexing="ij")
     lights = np.stack([np.cos(lat) * np.sin(lon), np.sin(lat), -np.cos(lat) * np.cos(lon)], -1).reshape(-1, 3)
     angle = np.cos(lat).ravel()
     radiance = source.level().reshape(-1, 3).astype(np.float64)
     means = np.empty((len(axes), 3))
     for i, axis in enumerate(axes):
-        w = weight(((axis - lights) ** 2).sum(1) / 4) * angle  # by (1 − cos γ)/2
+        w = weight((1 - lights @ axis) / 2) * angle
         means[i] = w @ radiance / w.sum()
     return means
 
@@ -103,50 +116,101 @@ def percentile(values: NDArray[np.floating], expected: FloatArray) -> float:
 def cases() -> Iterator[Case]:
     source = panorama()
     rng = np.random.default_rng(1)
+
+    def texels_of(size: int) -> tuple[FloatArray, NDArray[np.int64]]:
+        faces = [texel_directions("cube", size, size, face).reshape(-1, 3) for face in range(6)]
+        picked = rng.choice(6 * size * size, min(LOOKED_AT, 6 * size * size), replace=False)
+        return np.concatenate(faces)[picked].astype(np.float64), picked
+
     for name, lobe, weight, size in lobes():
-        directions = np.concatenate(
-            [texel_directions("cube", size, size, face).reshape(-1, 3) for face in range(6)]
-        )
-        picked = rng.choice(len(directions), LOOKED_AT, replace=False)
-        axes = directions[picked].astype(np.float64)
+        axes, picked = texels_of(size)
         start = time.perf_counter()
         expected = all_texels(source, weight, axes)
-        brute = (time.perf_counter() - start) * len(directions) / LOOKED_AT
-
-        def ours(lobe: Lobe = lobe, size: int = size) -> EnvMap:
-            return Prefilter(source).apply(lobe, size)
-
+        brute = (time.perf_counter() - start) * 6 * size * size / len(axes)
+        ours = partial(Prefilter(source).apply, lobe, size)
         error = np.abs(ours().level().reshape(-1, 3)[picked] / expected - 1)
         require(float(np.median(error)) <= 1e-3, f"{name}: median error {np.median(error)}")
         require(float(np.percentile(error, 99)) <= 1e-2, f"{name}: p99 {np.percentile(error, 99)}")
+        fresh = seconds(lambda lobe=lobe, size=size: Prefilter(source).apply(lobe, size), 1)  # type: ignore[misc]
         yield Case(
-            f"{name} into {size}²", "ms", 1e3 * seconds(ours, 1), 1e3 * brute,
+            f"{name} into {size}²", "ms", 1e3 * fresh, 1e3 * brute,
             "NumPy, all texels in float64", float(np.percentile(error, 99)), 0.0,
         )  # fmt: skip
     mips = source.mips()
+    kept = Prefilter(source)
     for alpha in (0.1, 0.5):
-        directions = np.concatenate(
-            [texel_directions("cube", 16, 16, face).reshape(-1, 3) for face in range(6)]
-        )
-        axes = directions[rng.choice(len(directions), LOOKED_AT, replace=False)].astype(np.float64)
+        axes, _ = texels_of(16)
         expected = all_texels(source, ggx_weight(alpha), axes)
         start = time.perf_counter()
         theirs = sampled(mips, alpha, axes)
         peer = (time.perf_counter() - start) / LOOKED_AT
-        kept = Prefilter(source)
-        one_lobe = partial(kept.apply, ggx(alpha), 16)
         mine = kept.sample(ggx(alpha), axes.astype(np.float32))
+        each = seconds(partial(kept.apply, ggx(alpha), 16), 1) / (6 * 16 * 16)
         yield Case(
-            case=f"GGX α = {alpha}, a texel",
-            unit="ms",
-            ours=1e3 / len(directions) * seconds(one_lobe, 1),
-            peer=1e3 * peer,
-            peer_name=f"{SAMPLES} filtered samples",
-            error_ours=percentile(mine, expected),
-            error_peer=percentile(theirs, expected),
-        )
+            f"GGX α = {alpha}, a texel", "ms", 1e3 * each, 1e3 * peer, f"{SAMPLES} filtered samples",
+            percentile(mine, expected), percentile(theirs, expected),
+        )  # fmt: skip
+    axes, _ = texels_of(16)
+    expected = all_texels(source, phong_weight(50), axes)
+    start = time.perf_counter()
+    theirs = all_texels(source, lambda h: phong_weight(50)(h) * (1 - 2 * h > 0.01 ** (1 / 50)), axes)
+    peer = (time.perf_counter() - start) / LOOKED_AT
+    mine = kept.sample(phong(50), axes.astype(np.float32))
+    each = seconds(partial(kept.apply, phong(50), 16), 1) / (6 * 16 * 16)
+    yield Case(
+        "Phong 50, a texel", "ms", 1e3 * each, 1e3 * peer, "a cone of texels, NumPy",
+        percentile(mine, expected), percentile(theirs, expected),
+    )  # fmt: skip
+    yield blurred()
+    yield from of_three_js()
     whole = seconds(lambda: ggx_chain(source, 256, 8), 1)
     yield Case("GGX chain 256², 8 levels", "ms", 1e3 * whole, 1e3, "what it may take", 0.0, 0.0)
+
+
+def blurred() -> Case:
+    """A lobe of von Mises and Fisher over a small map, as skylibs blurs it."""
+    kappa, source = 40.0, panorama(32)
+    other = importlib.import_module("envmap").EnvironmentMap(source.level().astype(np.float64), "latlong")
+    start = time.perf_counter()
+    with contextlib.redirect_stderr(io.StringIO()):  # its progress bar
+        theirs = other.blur(kappa).data
+    peer = time.perf_counter() - start
+    lobe = table(np.exp(kappa * (np.cos(np.linspace(0, np.pi, 721)) - 1)))
+    directions = texel_directions("latlong", 64, 32).reshape(-1, 3)
+    expected = all_texels(source, lambda h: np.exp(-2 * kappa * h), directions.astype(np.float64))
+    time_of_ours = seconds(lambda: Prefilter(source).apply(lobe, 32, "latlong"))
+    mine = Prefilter(source).apply(lobe, 32, "latlong").level().reshape(-1, 3)
+    return Case(
+        "von Mises and Fisher, 64 × 32", "ms", 1e3 * time_of_ours, 1e3 * peer, "skylibs, blur",
+        percentile(mine, expected), percentile(theirs.reshape(-1, 3), expected),
+    )  # fmt: skip
+
+
+def of_three_js() -> Iterator[Case]:
+    """A chain of three.js and, of some of its levels, the errors beside ours for the same α."""
+    source = panorama(512)
+    axes = np.random.default_rng(2).normal(size=(LOOKED_AT, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    made = _three.pmrem(source.level(), axes, [1, 2, 3, 4])
+    if made is None:
+        return
+    ours = Prefilter(source)
+    name = f"three.js, PMREM {made.size}²"
+    time_of_ours = seconds(lambda: ggx_chain(source, made.size, made.levels), 1)
+    yield Case(
+        f"GGX chain {made.size}², {made.levels} levels", "ms", 1e3 * time_of_ours, made.milliseconds,
+        name + ", SwiftShader", 0.0, 0.0,
+    )  # fmt: skip
+    for roughness, values in made.found:
+        alpha = roughness**2
+        expected = all_texels(source, ggx_weight(alpha), axes)
+        of_level = partial(ours.sample, ggx(alpha), axes.astype(np.float32))
+        each = seconds(of_level, 1) / LOOKED_AT
+        texels = sum(6 * (made.size >> level) ** 2 for level in range(made.levels))
+        yield Case(
+            f"GGX α = {alpha:.3g}, a texel", "ms", 1e3 * each, made.milliseconds / texels, name,
+            percentile(of_level(), expected), percentile(values, expected),
+        )  # fmt: skip
 
 
 def lobes() -> list[tuple[str, Lobe, Callable[[FloatArray], FloatArray], int]]:
@@ -154,6 +218,7 @@ def lobes() -> list[tuple[str, Lobe, Callable[[FloatArray], FloatArray], int]]:
         ("irradiance", lambert(), phong_weight(1), 16),
         *((f"Phong {n:g}", phong(n), phong_weight(n), 128) for n in (10, 128, 1e4)),
         *((f"GGX α = {a}", ggx(a), ggx_weight(a), 128) for a in (0.02, 0.1, 0.5)),
+        ("GGX α = 1", ggx(1.0), ggx_weight(1), 16),
     ]
 
 

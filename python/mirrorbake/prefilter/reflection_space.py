@@ -8,13 +8,20 @@ each warped so that its features lie where they belong, and blended by spherical
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 from mirrorbake import _core
 from mirrorbake.envmap import EnvMap
-from mirrorbake.projection import texel_directions, texel_solid_angles
+from mirrorbake.projection import (
+    directions_from_points,
+    points_from_directions,
+    texel_directions,
+    texel_solid_angles,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +30,9 @@ if TYPE_CHECKING:
 
     Brdf = Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
-WARPS = ("mirror", "normal")
+Warp: TypeAlias = Literal["mirror", "normal"]
+
+WARPS: tuple[Warp, ...] = ("mirror", "normal")
 
 
 def geodesic(refinements: int = 0) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -109,7 +118,7 @@ def radiance_map(envmap: EnvMap, brdf: Brdf, view: ArrayLike, size: int = 64) ->
         smaller.
     brdf
         Called with the cosines n·v, n·l and v·l as arrays that broadcast, the first two above 0; returns
-        1/steradian.
+        1/steradian, of all channels alike or, in one dimension more, of each.
     view
         Direction towards the viewer.
     size
@@ -131,8 +140,12 @@ def radiance_map(envmap: EnvMap, brdf: Brdf, view: ArrayLike, size: int = 64) ->
         n_v = np.maximum(normals[row] @ frame[:, 2], 1e-6)[:, None]
         n_l = normals[row] @ lights.T
         lit = n_l > 0
-        weight = brdf(n_v, np.where(lit, n_l, 1.0), (lights @ frame[:, 2])[None, :]) * np.where(lit, n_l, 0)
-        result[row] = weight @ power
+        value = brdf(n_v, np.where(lit, n_l, 1.0), (lights @ frame[:, 2])[None, :])
+        cosine = np.where(lit, n_l, 0)
+        if value.ndim > cosine.ndim:
+            result[row] = np.einsum("nlc,nl,lc->nc", value, cosine, power, optimize=True)
+        else:
+            result[row] = (value * cosine) @ power
     return EnvMap.from_array(result.astype(np.float32), "sphere_map", envmap.channels)
 
 
@@ -158,7 +171,9 @@ class RadianceMaps:
         views, triangles = geodesic(refinements)
         return cls(views, triangles, [radiance_map(envmap, brdf, view, size) for view in views])
 
-    def at(self, view: ArrayLike, *, warp: str = "mirror", size: int | None = None) -> EnvMap:
+    def at(
+        self, view: ArrayLike, *, warp: Warp = "mirror", size: int | None = None, rings: int | None = None
+    ) -> EnvMap:
         """Return the map for a viewer in any direction: three maps, warped and blended.
 
         Parameters
@@ -170,11 +185,14 @@ class RadianceMaps:
             diffuse ones.
         size
             Texels of a side; by default those of the maps.
+        rings
+            The warp is worked out at the vertices of a disc of so many rings, 2 to 256, denser towards its
+            edge, and linear between them, as graphics hardware draws it ([RSI] §3.3); None: for every texel.
 
         Raises
         ------
         InvalidArgument
-            For another warp, and a view that is not finite or zero.
+            For another warp or number of rings, and a view that is not finite or zero.
         """
         if warp not in WARPS:
             raise _core.InvalidArgument(f"warp is {warp!r}, expected {' or '.join(WARPS)}")
@@ -189,25 +207,126 @@ class RadianceMaps:
         triangle = self.triangles[int(np.argmax(inside.min(1)))]
         weights = spherical_weights(self.views[triangle], v)
         side = size or self.maps[0].layout.width
-        normals = _normals(side) @ frame.T
-        mirrored = 2 * (normals @ v)[..., None] * normals - v
+        mesh = None if rings is None else _Disc.make(rings, side)
+        normals = (_normals(side) if mesh is None else mesh.normals) @ frame.T
         total = np.zeros((side, side, self.maps[0].layout.channels))
         trust = np.zeros((side, side, 1))
         for corner, weight in zip(triangle, weights, strict=True):
-            source = view_frame(self.views[corner])
-            if warp == "mirror":
-                local = mirrored @ source
-                # Pinched where the source reflects straight backwards: |v + r| is 2 n·v of the source.
-                confidence = np.clip(np.linalg.norm(local + np.array([0.0, 0.0, 1.0]), axis=-1) / 0.4, 0, 1)
-            else:
-                n = normals @ source
-                local = 2 * n[..., 2:] * n - [0, 0, 1]
-                confidence = np.clip(n[..., 2] / 0.2, 0, 1)  # a map has no normals that face away
+            local, confidence = _warped(warp, normals, v, view_frame(self.views[corner]))
+            if mesh is not None:
+                local, confidence = mesh.between(local, confidence)
             usable = np.where((confidence > 0)[..., None], local, [0, 0, 1]).astype(np.float32)
             share = (weight * confidence**2 + 1e-9 * weight)[..., None]
             total += share * self.maps[corner].sample(usable)
             trust += share
         return EnvMap.from_array((total / trust).astype(np.float32), "sphere_map", self.maps[0].channels)
+
+
+def between_views(
+    envmap: EnvMap, brdf: Brdf, size: int = 32, refinements: int = 0, steps: int = 4, *, warp: Warp = "mirror"
+) -> list[tuple[float, float]]:
+    """How good warped maps are on the way from a corner of the sphere to the middle of a triangle.
+
+    Parameters
+    ----------
+    envmap, brdf, size, refinements
+        As for `RadianceMaps.make`.
+    steps
+        Views on the way after the first, 1 or more.
+    warp
+        As for `RadianceMaps.at`.
+
+    Returns
+    -------
+    list of (degrees, dB)
+        The angle from the corner, and the peak signal-to-noise ratio against `radiance_map` of that view
+        within the disc; of the corner itself it is that of reading the map between its texels.
+    """
+    maps = RadianceMaps.make(envmap, brdf, size, refinements)
+    corners = maps.views[maps.triangles[0]]
+    middle = corners.mean(0)
+    inside = np.hypot(*np.meshgrid(*2 * [(np.arange(size) + 0.5) / size * 2 - 1])) < 0.95
+    found = []
+    for step in range(steps + 1):
+        view = corners[0] + (middle - corners[0]) * step / steps
+        expected = radiance_map(envmap, brdf, view, size).level()[inside].astype(np.float64)
+        error = maps.at(view, warp=warp).level()[inside] - expected
+        angle = np.degrees(np.arccos(np.clip(view @ corners[0] / np.linalg.norm(view), -1, 1)))
+        noise = max(float(np.sqrt((error**2).mean())), 1e-9)
+        found.append((float(angle), float(20 * np.log10(expected.max() / noise))))
+    return found
+
+
+def _warped(
+    warp: str, normals: NDArray[np.float64], view: NDArray[np.float64], source: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    # Directions in which the map of a source is read for normals in the world, and how far it can be trusted.
+    if warp == "mirror":
+        mirrored = 2 * (normals @ view)[..., None] * normals - view
+        local = mirrored @ source
+        # Pinched where the source reflects straight backwards: |v + r| is 2 n·v of the source.
+        return local, np.clip(np.linalg.norm(local + np.array([0.0, 0.0, 1.0]), axis=-1) / 0.4, 0, 1)
+    n = normals @ source
+    # A map has no normals that face away.
+    return 2 * n[..., 2:] * n - [0, 0, 1], np.clip(n[..., 2] / 0.2, 0, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Disc:
+    """A disc of triangles that covers the texels of a sphere map.
+
+    Attributes
+    ----------
+    normals
+        Of the vertices (n, 3), in the space of the viewer.
+    corners, weights
+        Vertices (size, size, 3) and barycentric weights of every texel.
+    """
+
+    normals: NDArray[np.float64]
+    corners: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+    @classmethod
+    @lru_cache(maxsize=4)  # the same for every view
+    def make(cls, rings: int, size: int) -> _Disc:
+        if not 2 <= rings <= 256:
+            raise _core.InvalidArgument(f"rings is {rings}, expected 2 to 256")
+        # Radii sin(θ) of equal steps of the angle θ between normal and viewer: dense at the edge. The last
+        # ring is widened, so that its chords lie outside of the disc.
+        around = 4 * rings
+        turn = 2 * np.pi * np.arange(around) / around
+        radius = np.sin(np.pi / 2 * np.arange(1, rings + 1) / rings)
+        edge = radius.copy()
+        edge[-1] /= np.cos(np.pi / around)
+        circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        places = np.concatenate([[[0.0, 0.0]], (edge[:, None, None] * circle).reshape(-1, 2)])
+        flat = np.concatenate([[[0.0, 0.0]], (radius[:, None, None] * circle).reshape(-1, 2)])
+        depth = np.sqrt(np.maximum(0, 1 - (flat**2).sum(-1)))
+        triangles = Delaunay(places)
+        normals = _normals(size)  # of texels beyond the edge those of the edge
+        texels = normals[..., :2].reshape(-1, 2)
+        found = np.maximum(triangles.find_simplex(texels), 0)
+        transform = triangles.transform[found]
+        two = np.einsum("nij,nj->ni", transform[:, :2], texels - transform[:, 2])
+        weights = np.concatenate([two, 1 - two.sum(-1, keepdims=True)], axis=-1)
+        return cls(
+            np.concatenate([flat, depth[:, None]], axis=-1),
+            triangles.simplices[found].reshape(size, size, 3).astype(np.int64),
+            weights.reshape(size, size, 3),
+        )
+
+    def between(
+        self, directions: NDArray[np.float64], confidence: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Texture coordinates and confidence of the vertices, interpolated at the texels."""
+        _, points = points_from_directions("sphere_map", directions.astype(np.float32))
+        place = (points[self.corners] * self.weights[..., None]).sum(-2)
+        length = np.hypot(place[..., 0], place[..., 1])[..., None]
+        place /= np.maximum(1, length)  # an edge's chord leaves no disc but by rounding
+        trust: NDArray[np.float64] = (confidence[self.corners] * self.weights).sum(-1)
+        read = directions_from_points("sphere_map", np.zeros(place.shape[:-1], np.int32), place)
+        return read.astype(np.float64), np.clip(trust, 0, 1)
 
 
 def _normals(size: int) -> NDArray[np.float64]:

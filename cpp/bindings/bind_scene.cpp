@@ -178,12 +178,16 @@ void bind_shapes(nb::module_& m) {
   m.def("make_rectangle", &make_rectangle, nb::arg("corner"), nb::arg("u"), nb::arg("v"), Released(),
         "Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.");
   m.def(
-      "load_mesh", [](const PathText& path) { return load_mesh(path.text); }, nb::arg("path"), Released(),
-      "Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied "
-      "(instances\n"
-      "become copies) and missing vertex normals made by angle-weighted averaging. Raises FileError if the "
-      "file is\n"
-      "missing, corrupt, empty or refers to files outside its directory.");
+      "load_mesh",
+      [](const PathText& path, std::array<double, 3> origin) {
+        return load_mesh(path.text, {}, {origin[0], origin[1], origin[2]});
+      },
+      nb::arg("path"), nb::kw_only(), nb::arg("origin") = std::array{0.0, 0.0, 0.0}, Released(),
+      "Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied\n"
+      "(instances become copies) and missing vertex normals made by angle-weighted averaging. `origin`: as "
+      "of\n"
+      "load_scene. Raises FileError if the file is missing, corrupt, empty or refers to files outside its\n"
+      "directory.");
 }
 
 void bind_winding(nb::module_& m) {
@@ -251,15 +255,12 @@ void bind_loaded_scene(nb::module_& m) {
       nb::arg("max_triangles") = MeshLimits{}.max_triangles, nb::arg("luminous_efficacy") = 1.0F,
       nb::arg("origin") = std::array{0.0, 0.0, 0.0}, nb::call_guard<nb::gil_scoped_release>(),
       "Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,\n"
-      "materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in "
-      "memory\n"
-      "are read through the cache of texture files. glTF's candela, lux and nits are divided by\n"
-      "`luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's "
-      "zero, "
-      "before\npositions are rounded to float32. Raises FileError if a file is missing, corrupt, beyond a "
-      "limit "
-      "or\n"
-      "refers to files outside its directory.");
+      "materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in\n"
+      "memory are read through the cache of texture files. glTF's candela, lux and nits are divided by\n"
+      "`luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's\n"
+      "zero, before positions are rounded to float32. Raises FileError if a file is missing, corrupt, "
+      "beyond\n"
+      "a limit or refers to files outside its directory.");
   m.def(
       "referenced_files",
       [](const PathText& path, FileContent content) { return referenced_files(path.text, content); },

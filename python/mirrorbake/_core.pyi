@@ -627,11 +627,12 @@ def make_rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[floa
     Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.
     """
 
-def load_mesh(path: str | os.PathLike[str]) -> TriangleMesh:
+def load_mesh(path: str | os.PathLike[str], *, origin: Sequence[float] = [0.0, 0.0, 0.0]) -> TriangleMesh:
     """
-    Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied (instances
-    become copies) and missing vertex normals made by angle-weighted averaging. Raises FileError if the file is
-    missing, corrupt, empty or refers to files outside its directory.
+    Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied
+    (instances become copies) and missing vertex normals made by angle-weighted averaging. `origin`: as of
+    load_scene. Raises FileError if the file is missing, corrupt, empty or refers to files outside its
+    directory.
     """
 
 class Visibility(enum.Flag):
@@ -834,11 +835,11 @@ class LoadedScene:
 def load_scene(path: str | os.PathLike[str], *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, cache_textures_above: int = 67108864, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0, origin: Sequence[float] = [0.0, 0.0, 0.0]) -> LoadedScene:
     """
     Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,
-    materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in memory
-    are read through the cache of texture files. glTF's candela, lux and nits are divided by
-    `luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's zero, before
-    positions are rounded to float32. Raises FileError if a file is missing, corrupt, beyond a limit or
-    refers to files outside its directory.
+    materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in
+    memory are read through the cache of texture files. glTF's candela, lux and nits are divided by
+    `luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's
+    zero, before positions are rounded to float32. Raises FileError if a file is missing, corrupt, beyond
+    a limit or refers to files outside its directory.
     """
 
 def referenced_files(path: str | os.PathLike[str], content: Literal['mesh', 'scene']) -> list[str]:

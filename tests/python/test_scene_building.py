@@ -103,8 +103,9 @@ def test_by_default_the_object_fills_the_frame_and_stays_inside() -> None:
 def test_a_mesh_is_scaled_to_its_height_and_set_on_the_ground(cuboid: str) -> None:
     built = build(reflector={"mesh": cuboid, "height": 0.5, "position": [1, 2, 3]})
     # A quarter of the file's size: 0.25 x 0.5 x 1, the base's centre at the position.
-    np.testing.assert_allclose(built.positions.min(axis=0), (0.875, 2.0, 2.5), atol=1e-6)
-    np.testing.assert_allclose(built.positions.max(axis=0), (1.125, 2.5, 3.5), atol=1e-6)
+    assert built.origin == (1, 2, 3)
+    np.testing.assert_allclose(built.positions.min(axis=0), (-0.125, 0.0, -0.5), atol=1e-6)
+    np.testing.assert_allclose(built.positions.max(axis=0), (0.125, 0.5, 0.5), atol=1e-6)
     assert built.part_names == ["object"]
 
 

@@ -65,6 +65,7 @@ def make_header(**changes: Any) -> Header:
         map_size=SIZE,
         precision="float16",
         image_size=(WIDTH, HEIGHT),
+        origin=(1e5, 0.25, -3.0),
         run_time={"name": "reference", "lookups": 4, "footprint_scale": 0.25},
     )
     return dataclasses.replace(header, **changes)
@@ -168,7 +169,7 @@ def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
     fill(make_store(tmp_path))
     group: Any = zarr.open_group(tmp_path / GROUP_NAME, mode="r")
     attributes: Any = group.attrs["mirrorbake"]
-    assert attributes["format_version"] == 4
+    assert attributes["format_version"] == 5
     sizes = attributes["conventions"]["level_sizes"]
     assert sizes == [8, 4, 2, 1]
     names = [entry["name"] for entry in attributes["maps"]]
@@ -319,7 +320,7 @@ def test_damaged_metadata_is_one_clear_error(tmp_path: Path) -> None:
         other = json.loads(intact)
         other["attributes"]["mirrorbake"]["format_version"] = version
         metadata.write_text(json.dumps(other))
-        with pytest.raises(StoreError, match=f"format version {version}, this library reads 4.*{advice}"):
+        with pytest.raises(StoreError, match=f"format version {version}, this library reads 5.*{advice}"):
             PemStore.open(tmp_path)
 
 

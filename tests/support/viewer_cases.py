@@ -30,7 +30,7 @@ from mirrorbake.pem.run_time import fade_weight
 from mirrorbake.pem.shells import moved_proxy
 from mirrorbake.proxy import proxy_from_attributes, proxy_to_attributes
 from mirrorbake.scene.parameters import Axis, ParameterSpace
-from mirrorbake.scene.pose import Pose
+from mirrorbake.scene.pose import Pose, rotation_matrix
 from mirrorbake.viewer.export import write_folder
 
 if TYPE_CHECKING:
@@ -147,8 +147,11 @@ MOTION = {"to": [0.06, 0.01, -0.05], "turn": 50.0, "pivot": list(PIVOT)}
 
 def _pose(case: Case, t: float) -> Pose:
     if not case.moves:
-        return Pose(np.zeros(3), 0.0, np.array(PIVOT))
-    return Pose(t * np.array(MOTION["to"]), t * 50.0, np.array(PIVOT))
+        return Pose(np.zeros(3), 0.0)
+    # The page turns about a pivot, a pose about zero.
+    pivot, turned = np.array(PIVOT), t * 50.0
+    offset = t * np.array(MOTION["to"]) + pivot - rotation_matrix((0.0, turned, 0.0)) @ pivot
+    return Pose(offset, turned)
 
 
 def _waves(shift: float) -> FloatArray:
@@ -344,6 +347,7 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
             "aspect": WIDTH / HEIGHT,
             "pixels": HEIGHT,
         },
+        origin=(0.0, 0.0, 0.0),
         run_time=run_time_attributes(case.run_time),
         title=case.name,
         notes=(),

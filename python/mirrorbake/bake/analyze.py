@@ -36,8 +36,8 @@ SMALLEST_MAP, LARGEST_MAP = 16, 1024
 TEXELS_PER_LOBE = 4
 """Texels along a rough lobe's width at half of its height: more show nothing new."""
 
-LARGEST_BOX = 1e4
-"""Metres; hits further away are as good as infinite and do not shape the walls of a box."""
+LARGEST_BOX = 1e5
+"""Radii of the object; hits further away are as good as infinite and do not shape the walls of a box."""
 MIN_HITS = 100
 """Below this many reflected rays there is nothing to fit a shape to."""
 
@@ -182,7 +182,8 @@ def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
         return Decision("maps.distant", None, wanted, False, _SET, None), _core.Proxy.infinite(origin)
     distances = _distances(stage, probe)
     usable = distances > 0.0
-    near = usable & (distances < LARGEST_BOX)
+    radius = 0.5 * float(np.linalg.norm(np.ptp(built.positions, axis=0)))
+    near = usable & (distances < LARGEST_BOX * radius)
     if int(near.sum()) < MIN_HITS:
         if wanted is not None:
             raise InputError(

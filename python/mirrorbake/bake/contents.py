@@ -70,6 +70,7 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
         map_size=plan.map_size,
         precision=config.maps.precision,
         image_size=config.views.size,
+        origin=built.origin,
         run_time=_run_time(config, plan),
     )
     local_triangles = None

@@ -147,6 +147,7 @@ def _export_maps(
         out,
         axes=axis_descriptions(store.header.space),
         footprint=footprint_scale(store),
+        origin=store.header.origin,
         format=format,
         convention=convention,
         precision=precision,

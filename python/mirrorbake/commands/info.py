@@ -56,6 +56,7 @@ def _describe(store: PemStore) -> dict[str, Any]:
         "format": f"pem, made by mirrorbake {header.source.library}",
         "samples": f"{int(done.sum())} of {done.size}",
         "axes": axes or ["none"],
+        "zero at": ", ".join(f"{x:.10g}" for x in header.origin) + " m of the scene's world",
         "parts": shells,
         "maps": maps,
         "pictures": f"{width} × {height} pixels",

@@ -108,6 +108,8 @@ class Header:
     precision: Literal["float16", "float32"]
     image_size: tuple[int, int]
     """Pixels: width, height."""
+    origin: tuple[float, float, float]
+    """Where the zero of all positions lies in the scene file's world, metres."""
     run_time: dict[str, Any]
     """For what the maps were inferred: name, lookups per pixel, footprint_scale in pixels."""
 
@@ -125,7 +127,7 @@ class Header:
             "library": self.source.library,
             "fingerprint": self.fingerprint,
             "conventions": {
-                "world": "right-handed, +Y up, metres",
+                "world": "right-handed, +Y up, metres; positions are relative to `origin`",
                 "radiance": "scene-linear, Rec.709 primaries",
                 "faces": _FACES[self.projection],
                 "texels": "finest level (face, row, column), then the residuals of the coarser levels",
@@ -138,6 +140,7 @@ class Header:
             "map_size": self.map_size,
             "precision": self.precision,
             "image_size": list(self.image_size),
+            "origin": list(self.origin),
             "space": self.space.to_attributes(),
             "parts": [asdict(part) | {"shells": [asdict(s) for s in part.shells]} for part in self.parts],
             "maps": [asdict(entry) for entry in self.maps],
@@ -158,6 +161,7 @@ class Header:
         Raises KeyError or TypeError where the plan is none.
         """
         width, height = attributes["image_size"]
+        x, y, z = attributes["origin"]
         parts = (
             Part(part["name"], tuple(Shell(**shell) for shell in part["shells"]))
             for part in attributes["parts"]
@@ -172,6 +176,7 @@ class Header:
             map_size=attributes["map_size"],
             precision=attributes["precision"],
             image_size=(width, height),
+            origin=(x, y, z),
             run_time=attributes["run_time"],
         )
 

@@ -14,7 +14,7 @@ from mirrorbake.errors import StoreError
 from mirrorbake.proxy import proxy_from_attributes
 from mirrorbake.scene.config_values import MAX_IMAGE_SIDE, MAX_MAP_SIZE
 
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 MAX_SAMPLES = 100_000_000
 MAX_PARTS = 65535
 
@@ -116,7 +116,7 @@ class Attributes(_Model):
     """All of the group's attribute."""
 
     format: Literal["pem"]
-    format_version: Literal[4]
+    format_version: Literal[5]
     library: Annotated[str, Field(max_length=100)]
     fingerprint: Sha256
     conventions: dict[str, Any]
@@ -126,6 +126,7 @@ class Attributes(_Model):
     image_size: Annotated[
         list[Annotated[int, Field(ge=1, le=MAX_IMAGE_SIDE)]], Field(min_length=2, max_length=2)
     ]
+    origin: Triple
     space: Annotated[list[AxisAttributes], Field(max_length=8)]
     parts: Annotated[list[PartAttributes], Field(min_length=1, max_length=MAX_PARTS)]
     maps: Annotated[list[MapAttributes], Field(min_length=1, max_length=64 * MAX_PARTS)]

@@ -10,9 +10,10 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.errors import InputError
 from mirrorbake.scene.cameras import Cameras, resolve_cameras
+from mirrorbake.scene.origin import Origin, loaded_nearby
 from mirrorbake.scene.parameters import ParameterSpace, Point, format_point, space_of
 from mirrorbake.scene.pose import Pose
-from mirrorbake.scene.reflector import add_reflector
+from mirrorbake.scene.reflector import add_reflector, named_object
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,11 +28,13 @@ GROUND_THICKNESS = 0.02
 class BuiltScene:
     """A scene ready for tracing, and what the bake needs to know of its reflector."""
 
+    origin: Origin
+    """Where the zero of all positions here lies in the scene file's world."""
     scene: _core.Scene
     reflector: int
     """Number of the object."""
     positions: FloatArray
-    """(V, 3) of the reflector, world space."""
+    """(V, 3) of the reflector."""
     triangles: NDArray[np.uint32]
     """(T, 3)."""
     parts: NDArray[np.uint16]
@@ -68,7 +71,7 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     if config.light is not None:
         turned = surroundings.rotation + place.get("light", 0.0) * config.light.turn
         surroundings = surroundings.model_copy(update={"rotation": turned})
-    scene, notes = _surroundings(surroundings)
+    scene, notes, origin = _surroundings(config, surroundings)
     pose = Pose.of(config, place.get("motion", 0.0))
     reflector, more_notes = add_reflector(config, scene, pose)
     notes += more_notes
@@ -77,16 +80,17 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     triangles = np.asarray(mesh.triangles)
     parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
     # The cameras stay where they are when the object moves.
-    cameras = resolve_cameras(config.views, pose.at_rest(positions.astype(np.float64)))
+    cameras = resolve_cameras(config.views, pose.at_rest(positions.astype(np.float64)), origin)
     for sample in space.samples():
         eye = cameras.eye(sample)
         if _core.encloses(mesh, eye):
             where = f"t = {format_point(sample)}" if len(sample) == 1 else format_point(sample)
             raise InputError(
-                f"views: the eye at {where}, {_vector(eye)}, lies inside the reflector; "
+                f"views: the eye at {where}, {_vector(np.add(eye, origin))}, lies inside the reflector; "
                 "expected a view from outside"
             )
     return BuiltScene(
+        origin=origin,
         scene=scene,
         reflector=reflector,
         positions=positions,
@@ -99,24 +103,45 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     )
 
 
-def _vector(v: tuple[float, float, float]) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in v) + ")"
+def _vector(v: NDArray[np.float64]) -> str:
+    return "(" + ", ".join(f"{x:.7g}" for x in v) + ")"
 
 
-def _surroundings(surroundings: Surroundings) -> tuple[_core.Scene, list[str]]:
+def _surroundings(config: SceneConfig, surroundings: Surroundings) -> tuple[_core.Scene, list[str], Origin]:
+    """Return the surroundings, what the user should know of them, and where their zero is.
+
+    That is where the object stands; one that a file places is asked for its own position.
+    """
+    origin = config.reflector.position
     if surroundings.room is not None:
-        return _core.make_room(), []
+        scene = _core.make_room()
+        if any(origin):
+            scene.translate([-x for x in origin])
+        return scene, [], origin
     scene, notes = _core.Scene(), list[str]()
     if surroundings.scene is not None:
-        loaded = _core.load_scene(surroundings.scene)
+        loaded, origin = _loaded_scene(config, surroundings.scene)
         scene = loaded.scene
         notes = [f"{surroundings.scene}: {w.message} ({w.count} times)" for w in loaded.warnings]
     if surroundings.panorama is not None:
-        notes += _add_panorama(scene, surroundings)
-    return scene, notes
+        notes += _add_panorama(scene, surroundings, origin)
+    return scene, notes, origin
 
 
-def _add_panorama(scene: _core.Scene, surroundings: Surroundings) -> list[str]:
+def _loaded_scene(config: SceneConfig, path: str) -> tuple[_core.LoadedScene, Origin]:
+    def load(origin: Origin) -> _core.LoadedScene:
+        return _core.load_scene(path, origin=origin)
+
+    if config.reflector.scene_object is None:
+        origin = config.reflector.position
+        return load(origin), origin
+    return loaded_nearby(
+        load,
+        lambda loaded: np.asarray(loaded.scene.object_mesh(named_object(config, loaded.scene)).positions),
+    )
+
+
+def _add_panorama(scene: _core.Scene, surroundings: Surroundings, origin: Origin) -> list[str]:
     assert surroundings.panorama is not None
     panorama = _core.load_panorama(surroundings.panorama, surroundings.layer or "", surroundings.part or "")
     bad = int(np.count_nonzero(~np.isfinite(panorama)))
@@ -132,7 +157,10 @@ def _add_panorama(scene: _core.Scene, surroundings: Surroundings) -> list[str]:
     if surroundings.ground is not None:
         material = _core.Material(name="ground", albedo=surroundings.ground.albedo)
         disc = _core.make_cylinder(
-            (0.0, -GROUND_THICKNESS, 0.0), surroundings.ground.radius, GROUND_THICKNESS, 96
+            (-origin[0], -GROUND_THICKNESS - origin[1], -origin[2]),
+            surroundings.ground.radius,
+            GROUND_THICKNESS,
+            96,
         )
         scene.add_object("ground", disc, scene.add_material(material), [])
     return notes

@@ -50,7 +50,7 @@ class Cameras:
     """Of a dome, and of `none`: the lowest and the highest."""
 
     def eye(self, point: Point) -> tuple[float, float, float]:
-        """Return the eye's position, world space."""
+        """Return the eye's position."""
         radius, height, azimuth = self.radius, self.height, self.start
         if self.kind == "arc":
             azimuth += point[0] * self.degrees
@@ -120,7 +120,9 @@ class Cameras:
         return math.degrees(angle) if angle > SAME_DIRECTION else 0.0
 
 
-def resolve_cameras(views: Views, positions: NDArray[np.floating]) -> Cameras:
+def resolve_cameras(
+    views: Views, positions: NDArray[np.floating], origin: Sequence[float] = (0.0, 0.0, 0.0)
+) -> Cameras:
     """Return the cameras with what the scene file leaves to the object's size filled in.
 
     Parameters
@@ -128,11 +130,13 @@ def resolve_cameras(views: Views, positions: NDArray[np.floating]) -> Cameras:
     views
         The section of the scene file.
     positions
-        (V, 3) of the object, world space.
+        (V, 3) of the object.
+    origin
+        Where their zero lies in the scene file's world.
     """
     low, high = positions.min(axis=0).astype(float), positions.max(axis=0).astype(float)
     middle = 0.5 * (low + high)
-    centre = views.centre or (middle[0], middle[1], middle[2])
+    centre = middle if views.centre is None else np.subtract(views.centre, origin)
     elevation = math.radians(DEFAULT_ELEVATION_DEGREES)
     sphere = 0.5 * float(np.linalg.norm(high - low))
     distance = sphere / (FRAME_FILL * math.sin(math.radians(0.5 * views.fov)))

@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the object has moved to, as a function of its coordinate; lengths in metres."""
+    """Where the object has moved to, as a function of its coordinate; lengths in metres.
+
+    It turns about the vertical through the scene's zero, which is the centre of its base at rest.
+    """
 
     offset: NDArray[np.float64]
     """(3,) that it has moved."""
     turned: float
-    """Degrees about the vertical through `pivot`."""
-    pivot: NDArray[np.float64]
-    """(3,) the centre of the object's base at rest."""
+    """Degrees about the vertical."""
 
     @staticmethod
     def of(config: SceneConfig, coordinate: float) -> Pose:
         """Return the pose at a coordinate of [motion]; at rest without that section."""
-        pivot = np.array(config.reflector.position)
         if config.motion is None:
-            return Pose(np.zeros(3), 0.0, pivot)
-        return Pose(coordinate * np.array(config.motion.to), coordinate * config.motion.turn, pivot)
+            return Pose(np.zeros(3), 0.0)
+        return Pose(coordinate * np.array(config.motion.to), coordinate * config.motion.turn)
 
     @property
     def rotation(self) -> NDArray[np.float64]:
@@ -42,14 +42,14 @@ class Pose:
         """Return points (..., 3) that move with the object."""
         if not self.turned and not self.offset.any():
             return points
-        moved: NDArray[np.float64] = (points - self.pivot) @ self.rotation.T + self.pivot + self.offset
+        moved: NDArray[np.float64] = points @ self.rotation.T + self.offset
         return moved
 
     def at_rest(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Inverse of `moved`."""
         if not self.turned and not self.offset.any():
             return points
-        rest: NDArray[np.float64] = (points - self.offset - self.pivot) @ self.rotation + self.pivot
+        rest: NDArray[np.float64] = (points - self.offset) @ self.rotation
         return rest
 
 

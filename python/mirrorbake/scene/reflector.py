@@ -10,6 +10,7 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.errors import InputError
 from mirrorbake.scene.config import ILLUMINANT, MaterialConfig, Reflector, SceneConfig
+from mirrorbake.scene.origin import loaded_nearby
 from mirrorbake.scene.pose import Pose, rotation_matrix
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def add_reflector(config: SceneConfig, scene: _core.Scene, pose: Pose) -> tuple[
     config
         The scene file.
     scene
-        Its surroundings.
+        Its surroundings, whose zero is where the object stands.
     pose
         Where the object has moved to.
 
@@ -81,8 +82,8 @@ def _source(config: SceneConfig, scene: _core.Scene) -> _Source:
             return _Source(mesh, list(_core.teapot_part_names()), [], [])
         return _Source(_without_parts(mesh), [reflector.object or "object"], [], [])
     if config.material is not None:
-        return _Source(_core.load_mesh(reflector.mesh), ["object"], [], [])
-    loaded = _core.load_scene(reflector.mesh)
+        return _Source(_load_mesh(reflector.mesh), ["object"], [], [])
+    loaded = _load_objects(reflector.mesh)
     notes = [f"{reflector.mesh}: {w.message} ({w.count} times)" for w in loaded.warnings]
     mesh, names, materials = loaded.scene.join_objects(MOST_PARTS)
     if not any(loaded.scene.material(index).specular for index in materials):
@@ -99,6 +100,23 @@ def _source(config: SceneConfig, scene: _core.Scene) -> _Source:
         mesh, names, materials = _without_parts(mesh), ["object"], materials[:1]
     first = scene.add_materials(loaded.scene) if materials else 0
     return _Source(mesh, names, [first + index for index in materials], notes)
+
+
+# What stands on the ground is moved there, from wherever its file has it.
+def _load_mesh(path: str) -> _core.TriangleMesh:
+    mesh, _ = loaded_nearby(
+        lambda origin: _core.load_mesh(path, origin=origin), lambda mesh: np.asarray(mesh.positions)
+    )
+    return mesh
+
+
+def _load_objects(path: str) -> _core.LoadedScene:
+    def positions(loaded: _core.LoadedScene) -> FloatArray:
+        meshes = (loaded.scene.object_mesh(i) for i in range(len(loaded.scene.object_names)))
+        return np.concatenate([np.asarray(mesh.positions) for mesh in meshes])
+
+    loaded, _ = loaded_nearby(lambda origin: _core.load_scene(path, origin=origin), positions)
+    return loaded
 
 
 def _without_parts(mesh: _core.TriangleMesh) -> _core.TriangleMesh:
@@ -120,7 +138,7 @@ def _placed(mesh: _core.TriangleMesh, reflector: Reflector, pose: Pose) -> _core
     # Rotation and uniform scale leave normals unit vectors.
     normals = np.asarray(mesh.normals).astype(np.float64) @ (pose.rotation @ rotation).T
     return _core.TriangleMesh(
-        pose.moved(positions + np.array(reflector.position)).astype(np.float32),
+        pose.moved(positions).astype(np.float32),
         mesh.triangles,
         normals.astype(np.float32) if len(normals) else None,
         mesh.uvs if len(mesh.uvs) else None,
@@ -166,18 +184,23 @@ def _material(config: MaterialConfig, scene: _core.Scene) -> int:
     return scene.add_material(material)
 
 
-def _scene_reflector(config: SceneConfig, scene: _core.Scene) -> int:
+def named_object(config: SceneConfig, scene: _core.Scene) -> int:
+    """Return the number of `reflector.scene_object`; raises InputError if the scene has none."""
     name, names = config.reflector.scene_object, scene.object_names
     if name not in names:
         known = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
         raise InputError(f"{config.surroundings.scene}: has no object {name!r}; its objects: {known}")
-    reflector = names.index(name)
+    return names.index(name)
+
+
+def _scene_reflector(config: SceneConfig, scene: _core.Scene) -> int:
+    reflector = named_object(config, scene)
     if config.material is not None:
         # Other objects may share the file's material.
         scene.set_object_material(reflector, _material(config.material, scene))
     elif not any(scene.material(index).specular for index in scene.object_part_materials(reflector)):
         raise InputError(
-            f"{config.surroundings.scene}: the material of {name!r} is matte; "
+            f"{config.surroundings.scene}: the material of {config.reflector.scene_object!r} is matte; "
             "a section [material] makes it shine"
         )
     return reflector

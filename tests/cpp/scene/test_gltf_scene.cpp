@@ -310,6 +310,28 @@ TEST_F(GltfSceneFile, TextureTransformsAndSetsOfCoordinatesAreKept) {
   EXPECT_THAT(messages(loaded), ElementsAre(HasSubstr("several sets of texture coordinates")));
 }
 
+TEST_F(GltfSceneFile, OriginIsSubtractedBeforeRounding) {
+  Document document;
+  // A node of a node: offsets that floats cannot hold at 1e7 add up in double precision.
+  document.nodes =
+      R"([{"translation":[10000000,0,-5000000],"children":[1,2,3]},
+      {"mesh":0,"translation":[0.125,0.01,0.25]},
+      {"translation":[0.5,0.01,0.125],"extensions":{"KHR_lights_punctual":{"light":0}}},
+      {"translation":[0.75,0.02,0.375],"camera":0}])";
+  document.roots = "[0]";
+  document.extra = R"("extensionsUsed":["KHR_lights_punctual"],
+      "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":8}]}},
+      "cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}],)";
+  document.materials = "[{}]";
+  SceneOptions options;
+  options.origin = {1e7, 0.0, -5e6};
+  const LoadedScene loaded = load(document, options);
+  EXPECT_LT(glm::distance(loaded.scene.objects.at(0).mesh.positions.at(0), glm::vec3(0.125F, 0.01F, 0.25F)),
+            1e-7F);
+  EXPECT_LT(glm::distance(loaded.scene.point_lights.at(0).position, glm::vec3(0.5F, 0.01F, 0.125F)), 1e-7F);
+  EXPECT_LT(glm::distance(loaded.cameras.at(0).eye, glm::vec3(0.75F, 0.02F, 0.375F)), 1e-7F);
+}
+
 TEST_F(GltfSceneFile, LightsShineAlongTheirNodes) {
   Document document;
   document.materials = "[{}]";

@@ -49,6 +49,25 @@ std::vector<std::string> messages(const LoadedScene& loaded) {
   return result;
 }
 
+// Floats at 1e7 are whole numbers: whatever is left of a hundredth was subtracted before rounding.
+TEST_F(ObjSceneFile, OriginIsSubtractedBeforeRounding) {
+  const std::string path = write("far.obj",
+                                 "v 10000000.25 0 -5000000.5\nv 10000001.25 0.01 -5000000.5\n"
+                                 "v 10000000.25 1 -5000000.49\nf 1 2 3\n");
+  SceneOptions options;
+  options.origin = {1e7, 0.0, -5e6};
+  for (const TriangleMesh& mesh :
+       {load_scene(path, options).scene.objects.at(0).mesh, load_mesh(path, {}, options.origin)}) {
+    ASSERT_EQ(mesh.positions.size(), 3U);
+    EXPECT_LT(glm::distance(mesh.positions[0], glm::vec3(0.25F, 0, -0.5F)), 1e-7F);
+    EXPECT_LT(glm::distance(mesh.positions[1], glm::vec3(1.25F, 0.01F, -0.5F)), 1e-7F);
+    EXPECT_LT(glm::distance(mesh.positions[2], glm::vec3(0.25F, 1, -0.49F)), 1e-7F);
+  }
+  options.origin.y = 2e12;
+  EXPECT_THROW(load_scene(path, options), InvalidArgument);
+  EXPECT_THROW(load_mesh(path, {}, options.origin), InvalidArgument);
+}
+
 TEST_F(ObjSceneFile, HasOneObjectPerNameAndMaterial) {
   const LoadedScene loaded = load("newmtl red\nKd 1 0 0\nnewmtl shiny\nKd 0 0 1\n");
   const Scene& scene = loaded.scene;

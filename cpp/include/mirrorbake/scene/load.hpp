@@ -23,8 +23,9 @@ struct MeshLimits {
 /// averaging; degenerate triangles and unused vertices are dropped. Throws FileError if the file is missing,
 /// corrupt, empty, beyond `limits`, requires an unknown extension, refers to files outside its directory, has
 /// NaN or infinite vertices or normals, indices or offsets out of range, or no triangle with an area. The
-/// memory it takes is bounded by the sizes of the files and `limits`.
-TriangleMesh load_mesh(const std::string& path, const MeshLimits& limits = {});
+/// memory it takes is bounded by the sizes of the files and `limits`. `origin`: as in SceneOptions.
+TriangleMesh load_mesh(const std::string& path, const MeshLimits& limits = {},
+                       glm::dvec3 origin = glm::dvec3(0.0));
 
 struct SceneOptions {
   MeshLimits meshes;  ///< of all objects together

@@ -286,8 +286,8 @@ LoadedMesh gltf::read_meshes(const std::string& path, const tinygltf::Model& mod
   return builder.finish();
 }
 
-LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits) {
-  return gltf::read_meshes(path, gltf::read_document(path), limits, glm::dvec3(0.0), [](int) { return 0; });
+LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits, glm::dvec3 origin) {
+  return gltf::read_meshes(path, gltf::read_document(path), limits, origin, [](int) { return 0; });
 }
 
 }  // namespace mirrorbake

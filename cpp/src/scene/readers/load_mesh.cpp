@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <string>
 
 #include "loaded_mesh.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/scene/load.hpp"
 
 namespace mirrorbake {
@@ -16,13 +18,21 @@ std::string lower_extension(const std::string& path) {
   return extension;
 }
 
-TriangleMesh load_mesh(const std::string& path, const MeshLimits& limits) {
+void check_origin(glm::dvec3 origin) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(origin[axis]) <= 1e12) continue;
+    throw InvalidArgument("origin", text_of(glm::vec3(origin)), "finite coordinates up to 1e12");
+  }
+}
+
+TriangleMesh load_mesh(const std::string& path, const MeshLimits& limits, glm::dvec3 origin) {
+  check_origin(origin);
   const std::string extension = lower_extension(path);
   LoadedMesh loaded;
   if (extension == ".obj") {
-    loaded = read_obj(path, limits);
+    loaded = read_obj(path, limits, nullptr, origin);
   } else if (extension == ".gltf" || extension == ".glb") {
-    loaded = read_gltf(path, limits);
+    loaded = read_gltf(path, limits, origin);
   } else {
     throw FileError(path, "has the extension '" + extension + "', expected .obj, .gltf or .glb");
   }

@@ -1,5 +1,4 @@
-#include <cmath>
-
+#include "loaded_mesh.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "mirrorbake/scene/load.hpp"
@@ -15,10 +14,7 @@ void check_options(const SceneOptions& options) {
   if (!(options.luminous_efficacy >= 1e-6F && options.luminous_efficacy <= 1e6F)) {
     throw InvalidArgument("luminous_efficacy", text_of(options.luminous_efficacy), "1e-6 to 1e6");
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    if (std::abs(options.origin[axis]) <= 1e12) continue;
-    throw InvalidArgument("origin", text_of(glm::vec3(options.origin)), "finite coordinates up to 1e12");
-  }
+  check_origin(options.origin);
 }
 
 }  // namespace

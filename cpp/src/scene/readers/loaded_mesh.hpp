@@ -39,7 +39,10 @@ struct ObjContent {
 /// `origin` becomes the mesh's zero.
 LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjContent* content = nullptr,
                     glm::dvec3 origin = glm::dvec3(0.0));
-LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits);
+LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits, glm::dvec3 origin = glm::dvec3(0.0));
+
+/// Throws InvalidArgument unless an origin is usable.
+void check_origin(glm::dvec3 origin);
 
 /// Extension of a file name in lower case, with its dot.
 std::string lower_extension(const std::string& path);

@@ -95,7 +95,7 @@ def export_glb(
             "extensions": {EXTENSION: extension},
             "scene": 0,
             "scenes": [{"nodes": [0]}],
-            "nodes": [{"name": "reflector", "mesh": 0}],
+            "nodes": [_node(store)],
             "meshes": [{"name": "reflector", "primitives": _add_mesh(file, store, built, exported)}],
             "materials": [described],
         }
@@ -164,6 +164,13 @@ def _add_shell(file: GlbFile, name: str, shell: ShellMap, code: RadianceCode) ->
         atlas = to_atlas(alpha, shell.size).astype(np.uint8)
         entry["alpha"] = file.add_png(f"{name} alpha", atlas[..., 0])
     return entry
+
+
+def _node(store: PemStore) -> dict[str, Any]:
+    node: dict[str, Any] = {"name": "reflector", "mesh": 0}
+    if any(store.header.origin):
+        node["translation"] = list(store.header.origin)
+    return node
 
 
 def _proxy(description: dict[str, Any]) -> dict[str, Any]:

@@ -36,6 +36,7 @@ def export_maps(
     precision: str = "half",
     axes: Sequence[Mapping[str, Any]] = (),
     footprint: float = 1.0,
+    origin: Sequence[float] = (0.0, 0.0, 0.0),
     report: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """Write sets of maps and a `maps.json` that says what they are.
@@ -59,6 +60,8 @@ def export_maps(
         Of the parameter space, for the description.
     footprint
         Size of a lookup's footprint in pixels for which the maps were inferred, for the description.
+    origin
+        Where the zero of the maps' positions lies in the scene file's world, metres, for the description.
     report
         Called with a sentence for each thing to know, such as values that were clamped.
 
@@ -88,6 +91,7 @@ def export_maps(
         "radiance": "scene-linear, Rec.709 primaries; four channels: premultiplied by the fourth, alpha",
         "shells": "front to back: L = L0 + (1 - a0) (L1 + (1 - a1) (...))",
         "footprintScale": footprint,
+        "origin": (frame.space_matrix @ np.array(origin)).tolist(),
         "axes": list(axes),
         "sets": [],
     }

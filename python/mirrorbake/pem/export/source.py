@@ -85,6 +85,8 @@ class ExportSource:
     static_proxy: dict[str, Any]
     static_size: int
     camera: dict[str, Any]
+    origin: tuple[float, float, float]
+    """Where the zero of all positions lies in the scene file's world, metres."""
     run_time: dict[str, Any]
     title: str
     notes: tuple[str, ...]
@@ -167,6 +169,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
         static_proxy=header.static["proxy"] or header.static["infinite"],
         static_size=header.map_size,
         camera=_camera(pem),
+        origin=header.origin,
         run_time=run_time_attributes(pem.run_time.model),
         title=_title(header.source.config),
         notes=materials.notes,
@@ -209,7 +212,7 @@ def _motion(config: dict[str, Any]) -> dict[str, Any] | None:
     return {
         "to": list(motion["to"]),
         "turn": motion["turn"],
-        "pivot": list(config["reflector"]["position"]),
+        "pivot": [0.0, 0.0, 0.0],
     }
 
 

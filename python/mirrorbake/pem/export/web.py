@@ -158,6 +158,7 @@ class WebPem:
             "notes": list(source.notes),
             "runTime": source.run_time,
             "axes": source.space.to_attributes(),
+            "origin": list(source.origin),
             "camera": source.camera,
             "motion": source.motion,
             "materials": [_material(material) for material in source.materials.materials],

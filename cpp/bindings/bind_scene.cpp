@@ -197,9 +197,8 @@ void bind_winding(nb::module_& m) {
         return winding_number(mesh, {point[0], point[1], point[2]});
       },
       nb::arg("mesh"), nb::arg("point"),
-      "How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van "
-      "Oosterom\n"
-      "and Strackee 1983). Exactly 0 outside of the bounding box.");
+      "How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van\n"
+      "Oosterom and Strackee 1983). Exactly 0 outside of the bounding box.");
   m.def(
       "encloses",
       [](const TriangleMesh& mesh, std::array<double, 3> point) {

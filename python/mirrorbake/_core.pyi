@@ -653,8 +653,8 @@ class Visibility(enum.Flag):
 
 def winding_number(mesh: TriangleMesh, point: Sequence[float]) -> float:
     """
-    How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van Oosterom
-    and Strackee 1983). Exactly 0 outside of the bounding box.
+    How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van
+    Oosterom and Strackee 1983). Exactly 0 outside of the bounding box.
     """
 
 def encloses(mesh: TriangleMesh, point: Sequence[float]) -> bool:

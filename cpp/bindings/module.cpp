@@ -15,6 +15,7 @@ void bind_projection(nb::module_& m);
 void bind_display_fit(nb::module_& m);
 void bind_inference(nb::module_& m);
 void bind_pem(nb::module_& m);
+void bind_probe(nb::module_& m);
 void bind_prefilter(nb::module_& m);
 void bind_shading(nb::module_& m);
 
@@ -35,6 +36,7 @@ NB_MODULE(_core, m) {
   bind_inference(m);
   bind_display_fit(m);
   bind_pem(m);
+  bind_probe(m);
   bind_prefilter(m);
   bind_shading(m);
 }

@@ -1880,6 +1880,52 @@ def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArra
     Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex (V, 3).
     """
 
+class ProbedMatrix:
+    """What `probe_rendering_matrix` found out about a renderer."""
+
+    @property
+    def matrix(self) -> RenderingMatrix:
+        """RenderingMatrix whose rows sum to 1; it has no row_samples."""
+
+    @property
+    def scales(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """
+        float32 (rows, 3): what a white map shows in each row's pixel, less what a black one does.
+        """
+
+    @property
+    def errors(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """
+        float32 (rows,): largest error of pictures of random texels, relative to the scale.
+        """
+
+    @property
+    def renderings(self) -> int:
+        """How many pictures were drawn."""
+
+    @property
+    def colours(self) -> int:
+        """Groups of texels, no two of one group in any row."""
+
+    @property
+    def unresolved(self) -> int:
+        """Pixels that see the map and have no row."""
+
+def probe_rendering_matrix(topology: TexelTopology | CubePyramidLayout, render: Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]], *, most_renderings: int = 64, step: float = 0.0, tolerance: float = 1e-4) -> ProbedMatrix:
+    """
+    Rendering matrix of a renderer of which only pictures are to be had ([PEM] section 4).
+
+    topology: of the map. render: draws the view with the map's texels, float32 (texels, 3) in [0, 1], all levels as
+    given, and returns float32 (height, width, 3), linear in the texels but for a constant: no tone mapping, no
+    clamping. The channels may differ by a factor per pixel, such as Fresnel reflectance. most_renderings: 16 to 1024.
+    step: between the values that the renderer can return, 0 for floats, 1/255 for eight bits. tolerance: rows that
+    reproduce pictures of random texels worse than this, relative to their scale, are left out and counted.
+
+    A map of 128 x 128 texels a face with all levels takes about 50 pictures: three colours of texels a picture, no two
+    of one colour in any pixel. Raises ValueError for options out of range and pictures of changing size or with values
+    that are not finite.
+    """
+
 class Lobe:
     """A radially symmetric lobe of weights."""
 

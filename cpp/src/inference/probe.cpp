@@ -69,8 +69,8 @@ class Pictures {
 
 // What the pictures say relative to white and black.
 struct Calibration {
-  std::vector<float> black;   // pixels × 3
-  std::vector<float> scales;  // rows × 3
+  std::vector<float> black;           // pixels × 3
+  std::vector<float> scales;          // rows × 3
   std::vector<std::uint32_t> pixels;  // of the rows
 
   float relative(std::span<const float> picture, std::size_t row, std::size_t channel) const {
@@ -110,10 +110,9 @@ Footprints measure_footprints(const TexelTopology& topology, Pictures& pictures,
   const std::size_t rows = calibration.pixels.size();
   Footprints found{std::vector<glm::vec3>(rows), std::vector<glm::mat3>(rows, glm::mat3(0.0F)),
                    std::vector<std::uint32_t>(rows), std::vector<std::uint32_t>(rows)};
-  const std::vector<float> directions =
-      pictures.draw(centres.size(), [&](std::size_t t, std::size_t c) {
-        return 0.5F + 0.5F * centres[t][static_cast<int>(c)];
-      });
+  const std::vector<float> directions = pictures.draw(centres.size(), [&](std::size_t t, std::size_t c) {
+    return 0.5F + 0.5F * centres[t][static_cast<int>(c)];
+  });
   for (std::size_t r = 0; r < rows; ++r) {
     for (std::size_t c = 0; c < 3; ++c) {
       found.mean[r][static_cast<int>(c)] = 2.0F * calibration.relative(directions, r, c) - 1.0F;
@@ -154,8 +153,10 @@ Footprints measure_footprints(const TexelTopology& topology, Pictures& pictures,
       }
     }
   };
-  see(topology.levels(), [](const TexelPlace& place) { return place.level; }, found.levels);
-  see(topology.faces(), [](const TexelPlace& place) { return place.face; }, found.faces);
+  see(
+      topology.levels(), [](const TexelPlace& place) { return place.level; }, found.levels);
+  see(
+      topology.faces(), [](const TexelPlace& place) { return place.face; }, found.faces);
   return found;
 }
 
@@ -248,7 +249,9 @@ Colouring colour_texels(const RenderingMatrix& candidates, int most) {
   Colouring found{std::vector<std::uint16_t>(candidates.columns, kNoColour),
                   std::vector<std::uint8_t>(candidates.rows()), 0};
 
-  const auto length = [&](std::size_t r) { return candidates.row_offsets[r + 1] - candidates.row_offsets[r]; };
+  const auto length = [&](std::size_t r) {
+    return candidates.row_offsets[r + 1] - candidates.row_offsets[r];
+  };
   std::vector<std::uint32_t> order(candidates.rows());
   std::iota(order.begin(), order.end(), 0U);
   // Neighbours in the image stay together: what colours one of them used serves the next.
@@ -272,16 +275,16 @@ Colouring colour_texels(const RenderingMatrix& candidates, int most) {
       found.count = std::max(found.count, colour + 1);
       for (std::uint64_t k = columns.offsets[texel]; k < columns.offsets[texel + 1]; ++k) {
         taken[columns.rows[k] * words + static_cast<std::size_t>(colour) / 64] |= std::uint64_t{1}
-                                                                                 << (colour % 64);
+                                                                                  << (colour % 64);
       }
     }
   }
   // No two texels of a row have one colour by construction; a row fails only where one found none left.
   for (std::size_t r = 0; r < candidates.rows(); ++r) {
-    found.resolved[r] = std::all_of(
-        candidates.texels.begin() + static_cast<std::ptrdiff_t>(candidates.row_offsets[r]),
-        candidates.texels.begin() + static_cast<std::ptrdiff_t>(candidates.row_offsets[r + 1]),
-        [&](std::uint32_t texel) { return found.colours[texel] != kNoColour; });
+    found.resolved[r] =
+        std::all_of(candidates.texels.begin() + static_cast<std::ptrdiff_t>(candidates.row_offsets[r]),
+                    candidates.texels.begin() + static_cast<std::ptrdiff_t>(candidates.row_offsets[r + 1]),
+                    [&](std::uint32_t texel) { return found.colours[texel] != kNoColour; });
   }
   return found;
 }
@@ -328,8 +331,8 @@ std::vector<float> test_rows(const Calibration& calibration, const Colouring& co
     // Black or white alone, which any format of texels holds exactly.
     std::vector<float> texels(3 * candidates.columns);
     for (float& value : texels) value = static_cast<float>(random() & 1U);
-    const std::vector<float> picture = pictures.draw(
-        candidates.columns, [&](std::size_t t, std::size_t c) { return texels[3 * t + c]; });
+    const std::vector<float> picture =
+        pictures.draw(candidates.columns, [&](std::size_t t, std::size_t c) { return texels[3 * t + c]; });
     const std::vector<float> expected = multiply(candidates, texels, 3);
     for (std::size_t r = 0; r < candidates.rows(); ++r) {
       for (std::size_t c = 0; c < 3; ++c) {
@@ -397,8 +400,7 @@ ProbedMatrix probe_rendering_matrix(const TexelTopology& topology, const TestRen
     }
     for (std::uint64_t e = candidates.row_offsets[r]; e < candidates.row_offsets[r + 1]; ++e) {
       if (candidates.weights[e] == 0.0F) continue;
-      row.add(candidates.texels[e],
-              static_cast<float>(static_cast<double>(candidates.weights[e]) / sum));
+      row.add(candidates.texels[e], static_cast<float>(static_cast<double>(candidates.weights[e]) / sum));
     }
   });
   return probed;

@@ -54,8 +54,10 @@ float largest_difference(const RenderingMatrix& a, const RenderingMatrix& b) {
     while (q < a.rows() && a.row_pixels[q] != b.row_pixels[r]) ++q;
     if (q == a.rows()) return -1.0F;
     std::fill(dense.begin(), dense.end(), 0.0F);
-    for (std::uint64_t e = a.row_offsets[q]; e < a.row_offsets[q + 1]; ++e) dense[a.texels[e]] += a.weights[e];
-    for (std::uint64_t e = b.row_offsets[r]; e < b.row_offsets[r + 1]; ++e) dense[b.texels[e]] -= b.weights[e];
+    for (std::uint64_t e = a.row_offsets[q]; e < a.row_offsets[q + 1]; ++e)
+      dense[a.texels[e]] += a.weights[e];
+    for (std::uint64_t e = b.row_offsets[r]; e < b.row_offsets[r + 1]; ++e)
+      dense[b.texels[e]] -= b.weights[e];
     for (const float value : dense) largest = std::max(largest, std::abs(value));
   }
   return largest;
@@ -65,7 +67,8 @@ TEST(Probe, FindsEveryEntryOfARendererWithoutLookingInside) {
   for (const TexelTopology& topology :
        {TexelTopology::cube(64), TexelTopology::cube(128), TexelTopology::dual_paraboloid(64)}) {
     int calls = 0;
-    const KnownRenderer renderer{fragments(topology, web_run_time()), {1.0F, 0.9F, 0.4F}, 0.25F, 0.0F, &calls};
+    const KnownRenderer renderer{
+        fragments(topology, web_run_time()), {1.0F, 0.9F, 0.4F}, 0.25F, 0.0F, &calls};
     const ProbedMatrix probed = probe_rendering_matrix(topology, renderer);
     EXPECT_EQ(probed.renderings, calls);
     EXPECT_LE(calls, 64);
@@ -89,8 +92,8 @@ TEST(Probe, NoticesARendererThatReadsElsewhereThanItSeems) {
     std::vector<float> turned(texels.size());
     for (std::size_t t = 0; t < topology.texels(); ++t) {
       const TexelPlace place = topology.place(static_cast<std::uint32_t>(t));
-      const std::uint32_t other =
-          topology.index({place.level, place.face ^ 1, place.row, topology.width(place.level) - 1 - place.column});
+      const std::uint32_t other = topology.index(
+          {place.level, place.face ^ 1, place.row, topology.width(place.level) - 1 - place.column});
       std::copy_n(texels.begin() + 3 * static_cast<std::ptrdiff_t>(other), 3,
                   turned.begin() + 3 * static_cast<std::ptrdiff_t>(t));
     }

@@ -19,8 +19,8 @@ namespace mirrorbake {
 namespace {
 
 constexpr std::size_t kRowsPerChunk = 256;
-// A pixel reads within this many standard deviations of its mean direction: uniform weights on a line, taps of
-// a long footprint, end at 1.7; the tent of a bilinear read, at 2.5.
+// A pixel reads within this many standard deviations of its mean direction: uniform weights on a line, taps
+// of a long footprint, end at 1.7; the tent of a bilinear read, at 2.5.
 constexpr float kDeviations = 3.0F;
 // … and this many texels further, the reach of a bilinear read into sheared texels near a corner of a cube.
 constexpr float kReach = 2.0F;

@@ -38,12 +38,12 @@ struct ProbedMatrix {
 };
 
 /// Finds the weights from few pictures. First where a pixel looks: pictures of maps whose texels show their
-/// direction, its products, and their level give every pixel the mean and the covariance of the directions
-/// that it reads, and the levels. Texels within three standard deviations may be seen. Then what it reads:
-/// texels are coloured so that no pixel may see two of one colour, and every picture lights three colours, one
-/// a channel, so that each of its values is the weight of one texel. Last pictures of random texels,
-/// by which, and by the white one, every row is tested: a renderer that reads elsewhere than it seems is
-/// noticed.
+/// direction, its products, their level and their face give every pixel the mean and the covariance of the
+/// directions that it reads, and the levels and faces. Texels within three standard deviations may be seen.
+/// Then what it reads: texels are coloured so that no pixel may see two of one colour, and every picture
+/// lights three colours, one a channel, so that each of its values is the weight of one texel. Last pictures
+/// of random texels, by which, and by the white one, every row is tested: a renderer that reads elsewhere
+/// than it seems is noticed.
 ///
 /// Throws InvalidArgument for options out of range, and if `render` returns another number of values than
 /// before, none, or values that are not finite.

@@ -8,20 +8,18 @@ same texels, with as much anisotropy as there are taps. Times are of a frame of 
 """
 
 import importlib
-import re
 import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks._page import beyond, layers_of, reads_of_the_page
 from benchmarks._report import Case, require, run
 from mirrorbake.envmap import EnvMap
 
-SHADERS = Path(__file__).parents[1] / "viewer" / "src" / "gl" / "shaders.ts"
 SIZE = 128
 FRAME = 1024
 RUNS = 5
@@ -69,40 +67,6 @@ void main() {
 """
 
 
-def reads_of_the_page() -> str:
-    """The functions of the page's shader that read maps."""
-    found = re.search(r"const READS = `(.*?)`;", SHADERS.read_text(encoding="utf-8"), re.DOTALL)
-    require(found is not None, f"{SHADERS}: has no READS")
-    assert found is not None
-    return found.group(1)
-
-
-def layers_of(levels: list[EnvMap]) -> NDArray[np.float32]:
-    """All levels of a cube map as the page keeps them (viewer/src/atlas.ts), with borders."""
-    count = len(levels)
-    height, width = max(SIZE + 2, SIZE - 1 + 2 * (count - 1)), SIZE + 2 + SIZE // 2 + 2
-    layers = np.zeros((6, height, width, 3), np.float32)
-    for level, envmap in enumerate(levels):
-        n = SIZE >> level
-        x, y = (0, 0) if level == 0 else (SIZE + 2, SIZE - 2 * n + 2 * (level - 1))
-        place = (np.arange(-1, n + 1) + 0.5) / n * 2.0 - 1.0
-        s, t = np.meshgrid(place, place)
-        for face in range(6):
-            block = envmap.sample(beyond(face, s, t), filter="nearest")
-            for row, column in ((0, 0), (0, -1), (-1, 0), (-1, -1)):
-                r, c = (1 if row == 0 else -2), (1 if column == 0 else -2)
-                block[row, column] = (block[r, c] + block[row, c] + block[r, column]) / 3.0
-            layers[face, y : y + n + 2, x : x + n + 2] = block
-    return layers
-
-
-def beyond(face: int, s: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Directions of places of a face and around it, in OpenGL's orientation; t counts downwards."""
-    one = np.ones_like(s)
-    axes = [(one, -t, -s), (-one, -t, s), (s, one, t), (s, -one, -t), (s, -t, one), (-s, -t, -one)]
-    return np.stack(axes[face], axis=-1).astype(np.float32)
-
-
 def face_length(d: NDArray[np.float64], change: NDArray[np.float64]) -> NDArray[np.float64]:
     """Length of a differential on the face of the direction, in faces."""
     axis = np.abs(d).argmax(axis=-1)[..., None]
@@ -129,8 +93,10 @@ def expected(
     for pair in range(most // 2 if most > 1 else 0):
         weight = np.where(pair + 1 < pairs, 1.0, 0.5 * (n - 2.0 * (pairs - 1.0))) / n
         weight = np.where(pair < pairs, weight, 0.0)
+        outermost = (pair + 1 == pairs) & (pair > 0)
+        offset = np.where(outermost, 0.5 * (pair / n + 0.5), (pair + 0.5) * step)
         for side in (1.0, -1.0):
-            place = d + (side * (pair + 0.5) * step)[..., None] * longer
+            place = d + (side * offset)[..., None] * longer
             total += weight[..., None] * envmap.sample(place, filter="trilinear", level=level)
     result: NDArray[np.float64] = np.where((pairs == 0)[..., None], single, total)
     return result

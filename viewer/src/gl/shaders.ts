@@ -176,8 +176,10 @@ vec3 tapDirection(Taps taps, vec3 d, int tap, out float weight) {
   weight = 1.0;
   if (taps.pairs == 0) return d;
   int pair = tap >> 1;
-  float offset = (float(pair) + 0.5) * taps.step;
-  weight = (pair + 1 < taps.pairs ? 1.0 : 0.5 * (taps.n - 2.0 * float(taps.pairs - 1))) / taps.n;
+  bool outermost = pair + 1 == taps.pairs;
+  // The outermost of several pairs takes the middles of what the others leave of the differential.
+  float offset = outermost && pair > 0 ? 0.5 * (float(pair) / taps.n + 0.5) : (float(pair) + 0.5) * taps.step;
+  weight = (outermost ? 0.5 * taps.n - float(pair) : 1.0) / taps.n;
   return d + ((tap & 1) == 0 ? offset : -offset) * taps.longer;
 }
 

@@ -74,11 +74,10 @@ void show(nb::class_<T, Extra...>& type, std::vector<const char*> attributes) {
   });
 }
 
-/// Gives a struct of plain values a repr, and lets it be pickled and copied: `attributes` are all that it
-/// has, each of which can be set, and its default value is a valid one.
+/// Lets a struct of plain values be pickled and copied: `attributes` are all that it has, each of which can
+/// be set, and its default value is a valid one.
 template <typename T, typename... Extra>
-void record(nb::class_<T, Extra...>& type, std::vector<const char*> attributes) {
-  show(type, attributes);
+void pickle(nb::class_<T, Extra...>& type, std::vector<const char*> attributes) {
   type.def("__getstate__",
            [attributes](nb::handle self) {
              nb::dict state;
@@ -90,6 +89,13 @@ void record(nb::class_<T, Extra...>& type, std::vector<const char*> attributes) 
         nb::inst_mark_ready(self);
         for (auto [attribute, value] : state) nb::setattr(self, attribute, value);
       });
+}
+
+/// The same, with a repr.
+template <typename T, typename... Extra>
+void record(nb::class_<T, Extra...>& type, std::vector<const char*> attributes) {
+  show(type, attributes);
+  pickle(type, std::move(attributes));
 }
 
 }  // namespace mirrorbake::bindings

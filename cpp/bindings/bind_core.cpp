@@ -2,8 +2,10 @@
 
 #include "bind.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/version.hpp"
+#include "mirrorbake/image/missing_library.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -12,12 +14,27 @@ struct ScopedLimit {
   std::optional<ThreadLimit> limit;  // none once its block has ended
 };
 
+unsigned long main_thread =
+    0;  // as threading.main_thread().ident, on which Python runs its handlers of signals
+
+/// Lets Python look at its signals; KeyboardInterrupt, or what a handler raises, stops the computation.
+void raise_if_interrupted() {
+  if (PyThread_get_thread_ident() != main_thread) return;
+  const nb::gil_scoped_acquire held;
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+}
+
 }  // namespace
 
 void bind_core(nb::module_& m) {
   nb::exception<InvalidArgument>(m, "InvalidArgument", PyExc_ValueError);
   nb::exception<FileError>(m, "FileError", PyExc_OSError);
+  nb::exception<MissingLibrary>(m, "MissingLibrary", PyExc_ImportError);
   nb::exception<NumericalError>(m, "NumericalError", PyExc_ArithmeticError);
+
+  main_thread =
+      nb::cast<unsigned long>(nb::module_::import_("threading").attr("main_thread")().attr("ident"));
+  set_interrupt_check(&raise_if_interrupted);
 
   m.def("version", &version, "Version of the compiled library, 'MAJOR.MINOR.PATCH'.");
   m.def("thread_count", &thread_count, "Number of threads that parallel loops use now.");

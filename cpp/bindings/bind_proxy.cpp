@@ -1,12 +1,15 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <variant>
 #include <vector>
@@ -135,6 +138,35 @@ nb::ndarray<nb::numpy, float> mirror_lookups_of_layers(const std::vector<Proxy>&
   check_rays(positions, "normals", normals);
   return map_triples(positions, normals, proxies.size(),
                      [&](auto p, auto n, auto lookups) { mirror_lookups(proxies, eye, p, n, lookups); });
+}
+
+/// What a proxy consists of, for pickles: kind, origin, centre, size (a radius thrice) and axes.
+nb::tuple proxy_state(const Proxy& proxy) {
+  const auto state = [&](glm::vec3 centre, glm::vec3 size, const glm::mat3& proxy_from_world) {
+    return nb::make_tuple(kind_name(proxy), proxy.origin, centre, size,
+                          std::vector<float>(&proxy_from_world[0][0], &proxy_from_world[0][0] + 9));
+  };
+  if (const auto* box = std::get_if<Box>(&proxy.shape)) {
+    return state(box->centre, box->half_extent, box->proxy_from_world);
+  }
+  if (const auto* ellipsoid = std::get_if<Ellipsoid>(&proxy.shape)) {
+    return state(ellipsoid->centre, ellipsoid->radii, ellipsoid->proxy_from_world);
+  }
+  if (const auto* hemisphere = std::get_if<Hemisphere>(&proxy.shape)) {
+    return state(hemisphere->centre, glm::vec3(hemisphere->radius), hemisphere->proxy_from_world);
+  }
+  return state(glm::vec3(0.0F), glm::vec3(0.0F), glm::mat3(1.0F));
+}
+
+Proxy proxy_from_state(const std::string& kind, glm::vec3 origin, glm::vec3 centre, glm::vec3 size,
+                       const std::vector<float>& proxy_from_world) {
+  if (proxy_from_world.size() != 9) throw InvalidArgument("state", "of other axes", "9 numbers");
+  glm::mat3 matrix;
+  std::copy(proxy_from_world.begin(), proxy_from_world.end(), &matrix[0][0]);
+  if (kind == "box") return make_proxy(Box{centre, size, matrix}, origin);
+  if (kind == "ellipsoid") return make_proxy(Ellipsoid{centre, size, matrix}, origin);
+  if (kind == "hemisphere") return make_proxy(Hemisphere{centre, size.x, matrix}, origin);
+  return make_proxy(InfiniteSphere{}, origin);
 }
 
 std::span<const glm::vec3> points(const PointArray& array) {
@@ -270,6 +302,12 @@ Raises
 ------
 InvalidArgument
     Shapes that differ or do not end in 3, NaN or infinite values (the row is named).)")
+      .def("__getstate__", &proxy_state)
+      .def("__setstate__",
+           [](Proxy& self,
+              const std::tuple<std::string, glm::vec3, glm::vec3, glm::vec3, std::vector<float>>& state) {
+             new (&self) Proxy(std::apply(proxy_from_state, state));
+           })
       .def("validate", &validate, "Raises InvalidArgument, naming the field, if the proxy is not usable.")
       .def("__repr__", [](const Proxy& p) {
         const nb::object self = nb::cast(p);

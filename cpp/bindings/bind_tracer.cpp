@@ -30,7 +30,8 @@ std::span<const glm::vec3> points(const PointArray& array) {
 }  // namespace
 
 void bind_tracer(nb::module_& m) {
-  nb::class_<Camera>(m, "Camera", "A pinhole camera. Pixel (0,0) is the top left one.")
+  nb::class_<Camera> camera_class(m, "Camera", "A pinhole camera. Pixel (0,0) is the top left one.");
+  camera_class
       .def(
           "__init__",
           [](Camera* self, glm::vec3 eye, glm::vec3 target, glm::vec3 up, float vertical_fov_degrees,
@@ -56,6 +57,7 @@ void bind_tracer(nb::module_& m) {
                ", vertical_fov_degrees=" + text_of(c.vertical_fov_degrees) +
                ", width=" + std::to_string(c.width) + ", height=" + std::to_string(c.height) + ")";
       });
+  pickle(camera_class, {"eye", "target", "up", "vertical_fov_degrees", "width", "height"});
 
   nb::class_<TracerOptions> tracer_options(m, "TracerOptions", "What is decided once per scene.");
   tracer_options

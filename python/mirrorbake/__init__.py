@@ -6,6 +6,17 @@ reflectance and proxy geometry have modules of their own: `mirrorbake.envmap`, `
 `mirrorbake.bake` and `mirrorbake.evaluate`, and behind the command `mirrorbake`.
 """
 
+try:
+    from mirrorbake import _core as _core
+except ImportError as failure:
+    if ".so" not in str(failure) and ".dylib" not in str(failure):
+        raise
+    raise ImportError(
+        f"mirrorbake's compiled part cannot be loaded: {failure}. Install Embree, oneTBB, OpenEXR, libwebp, "
+        "tinygltf, Draco and meshoptimizer as it was built with (Debian, Ubuntu: apt-get install libembree-dev "
+        "libtbb-dev libopenexr-dev libwebp-dev libtinygltf-dev libdraco-dev libmeshoptimizer-dev)"
+    ) from failure
+
 from mirrorbake._core import (
     Camera,
     CubePyramidLayout,

@@ -16,6 +16,9 @@ class InvalidArgument(ValueError):
 class FileError(OSError):
     pass
 
+class MissingLibrary(ImportError):
+    pass
+
 class NumericalError(ArithmeticError):
     pass
 
@@ -150,6 +153,10 @@ class Proxy:
         InvalidArgument
             Shapes that differ or do not end in 3, NaN or infinite values (the row is named).
         """
+
+    def __getstate__(self) -> tuple: ...
+
+    def __setstate__(self, arg: tuple[str, Sequence[float], Sequence[float], Sequence[float], Sequence[float]], /) -> None: ...
 
     def validate(self) -> None:
         """Raises InvalidArgument, naming the field, if the proxy is not usable."""
@@ -1057,6 +1064,10 @@ class Camera:
     def __eq__(self, other: object, /) -> bool: ...
 
     def __repr__(self) -> str: ...
+
+    def __getstate__(self) -> dict: ...
+
+    def __setstate__(self, arg: dict, /) -> None: ...
 
 class TracerOptions:
     """What is decided once per scene."""

@@ -1,5 +1,7 @@
 """Proxy geometry from Python: shapes, lookups against NumPy in float64, fits against SciPy's solver."""
 
+import copy
+import pickle
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from mirrorbake.proxy import (
     fit_ellipsoid,
     hull_triangles,
     mirror_lookups,
+    proxy_to_attributes,
 )
 
 # Orthonormal in exact decimals.
@@ -245,3 +248,20 @@ def test_choose_proxy_takes_the_room_and_says_why() -> None:
     assert choose_proxy(positions, directions, far, views, origin=(0, 0, 0)).best.name == "infinite"
     with pytest.raises(ValueError, match="at least 16"):
         choose_proxy(positions[:3], directions[:3], far[:3], views[:3], origin=(0, 0, 0))
+
+
+@pytest.mark.parametrize(
+    "proxy",
+    [
+        Proxy.infinite((0, 1, 0)),
+        Proxy.box(
+            (0, 1, 0), (3, 1, 2), (0, 0.5, 0), axes=np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], np.float32)
+        ),
+        Proxy.ellipsoid((0, 1, 0), (3, 1, 2)),
+        Proxy.hemisphere((0, 0, 0), 2, (0, 0.5, 0)),
+    ],
+    ids=lambda proxy: proxy.kind,
+)
+def test_proxies_pickle_and_copy(proxy: Proxy) -> None:
+    for again in (pickle.loads(pickle.dumps(proxy)), copy.copy(proxy), copy.deepcopy(proxy)):
+        assert proxy_to_attributes(again) == proxy_to_attributes(proxy)

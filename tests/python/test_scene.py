@@ -207,6 +207,8 @@ def test_meshes_materials_and_options_pickle_and_copy() -> None:
     ]
     for thing in [material, *options]:
         assert repr(pickle.loads(pickle.dumps(thing))) == repr(copy.deepcopy(thing)) == repr(thing)
+    camera = _core.Camera((0, 1, 2), (0, 0, 0.1), vertical_fov_degrees=30, width=8, height=4)
+    assert pickle.loads(pickle.dumps(camera)) == copy.copy(camera) == camera
     assert "lobe='ggx'" in repr(material)
     assert "model='conductor'" in repr(material)
 

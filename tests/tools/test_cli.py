@@ -136,6 +136,15 @@ def test_a_process_ends_with_the_status_and_the_streams_of_the_manual(tmp_path: 
     assert json.loads(result.stdout)["views"][0]["place"] == "on"
 
 
+def test_the_c_locale_can_print_everything() -> None:
+    plain = os.environ | {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [sys.executable, "-m", "mirrorbake", "study", "fresnel", "--samples", "50"]
+    result = subprocess.run(command, capture_output=True, env=plain, check=False)
+    assert result.returncode == 0, result.stderr
+    assert not result.stdout.isascii()
+    assert "\ufffd" not in result.stdout.decode()
+
+
 @pytest.mark.parametrize("command", ["bake", "analyze", "evaluate", "sheet", "render", "demo"])
 def test_every_command_explains_itself(command: str) -> None:
     result = run(command, "--help")

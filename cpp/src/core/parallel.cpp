@@ -3,13 +3,18 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
 #include <string>
 #include <vector>
 
 #include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/interrupt.hpp"
 
 #ifdef MIRRORBAKE_THREAD_SANITIZER
 #include <sanitizer/tsan_interface.h>
@@ -49,7 +54,27 @@ struct Chunk {
   Chunk& operator=(const Chunk&) = delete;
 };
 
+constexpr auto kBetweenChecks = std::chrono::milliseconds(20);
+
+std::atomic<InterruptCheck> interrupt_check{nullptr};
+
+/// Ends a chunk of a loop that was stopped elsewhere; the loop drops it for what stopped it.
+struct Stopped : std::exception {};
+
 }  // namespace
+
+void set_interrupt_check(InterruptCheck check) { interrupt_check = check; }
+
+void poll_interrupt() {
+  const InterruptCheck check = interrupt_check.load(std::memory_order_relaxed);
+  if (check == nullptr) return;
+  thread_local std::chrono::steady_clock::time_point last;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - last < kBetweenChecks) return;
+  last = now;
+  if (tbb::is_current_task_group_canceling()) throw Stopped();
+  check();
+}
 
 struct ThreadLimit::State {
   explicit State(std::size_t threads) : control(tbb::global_control::max_allowed_parallelism, threads) {}
@@ -74,10 +99,12 @@ void parallel_for(std::size_t count, std::size_t grain,
   grain = std::max<std::size_t>(grain, 1);
   const std::size_t chunks = (count + grain - 1) / grain;
   if (chunks == 0) return;
+  poll_interrupt();
   if (chunks == 1) return body(0, count);
   Loop loop;
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t index) {
     const Chunk chunk(loop);
+    poll_interrupt();
     body(index * grain, std::min(count, (index + 1) * grain));
   });
 }

@@ -2,7 +2,7 @@
 
 #include <dlfcn.h>
 
-#include "mirrorbake/core/error.hpp"
+#include "mirrorbake/image/missing_library.hpp"
 
 namespace mirrorbake::image_files {
 namespace {
@@ -14,9 +14,11 @@ const OpenImageIo& load() {
   void* const entry = library == nullptr ? nullptr : dlsym(library, MIRRORBAKE_OPENIMAGEIO_ENTRY);
   if (entry == nullptr) {
     const char* const reason = dlerror();
-    throw FileError(MIRRORBAKE_OPENIMAGEIO_LIBRARY,
-                    std::string("is needed for HDR, TIFF, PNG and JPEG files and cannot be loaded: ") +
-                        (reason == nullptr ? "unknown reason" : one_line(reason)));
+    throw MissingLibrary(MIRRORBAKE_OPENIMAGEIO_LIBRARY,
+                         std::string("is needed for TIFF, PNG and JPEG files and for writing HDR, and cannot "
+                                     "be loaded: ") +
+                             (reason == nullptr ? "unknown reason" : one_line(reason)) +
+                             "; install OpenImageIO (Debian, Ubuntu: apt-get install libopenimageio-dev)");
   }
   return *reinterpret_cast<const OpenImageIo* (*)()>(entry)();
 }

@@ -11,6 +11,7 @@
 #include "camera_rays.hpp"
 #include "integrator.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "options.hpp"
@@ -42,6 +43,7 @@ void BeautySums::trace(const LitWorld& lit, const RayScene::View& view, const Tr
     const RowSegment segment{image_width_, y, area.x, area.width, samples_[tile], samples - samples_[tile]};
     PrimaryRow row(view, options.seed, segment, [&](glm::vec2 point) { return ray_through(y, point); });
     for (int x = area.x; x < area.x + area.width; ++x) {
+      poll_interrupt();
       const std::size_t p = pixel(x, y);
       for (int i = 0; i < segment.samples; ++i) {
         const PrimarySample& s = row.next();

@@ -9,6 +9,7 @@
 
 #include "barycentric.hpp"
 #include "gather.hpp"
+#include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "world.hpp"
 
@@ -171,6 +172,7 @@ void IrradianceCache::gather(const World& world, const TracerOptions& options) {
       parallel_for(slots, 32, [&](std::size_t begin, std::size_t end) {
         for (std::size_t slot = begin; slot < end; ++slot) {
           if (given_up[side][slot] != 0) continue;
+          poll_interrupt();
           const SlotGather gathered = pass == 0 ? gather_slot(world, slot, side, rays, direct)
                                                 : gather_slot(world, slot, side, rays, indirect);
           found.side[side][slot] = gathered.irradiance;

@@ -8,6 +8,7 @@
 #include "camera_rays.hpp"
 #include "integrator.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "options.hpp"
@@ -191,6 +192,7 @@ void LayerTracer::trace_piece(const Piece& piece, std::size_t first_pixel, Pixel
     return Ray{eye, rays_.direction(point)};
   });
   for (int x = 0; x < piece.columns; ++x) {
+    poll_interrupt();
     const std::size_t pixel = first_pixel + static_cast<std::size_t>(x);
     for (auto& of_reflector : pixels) of_reflector[pixel].plan(piece.first_sample + piece.samples);
     for (int i = 0; i < piece.samples; ++i) {

@@ -3,6 +3,7 @@
 #include <glm/geometric.hpp>
 
 #include "gather.hpp"
+#include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "options.hpp"
 #include "state.hpp"
@@ -42,6 +43,7 @@ std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint
     for (std::size_t v = begin; v < end; ++v) {
       const std::uint32_t count = first[v + 1] - first[v];
       if (count == 0) continue;
+      poll_interrupt();
       glm::dvec3 sum(0.0);
       for (int r = 0; r < rays; ++r) {
         const auto index = static_cast<std::uint32_t>(r);

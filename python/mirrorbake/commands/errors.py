@@ -42,7 +42,7 @@ def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
             return command(*args, **kwargs)
         except OptionError as failure:
             raise _fail(str(failure), EXIT_USAGE) from None
-        except (InputError, _core.InvalidArgument, OSError) as failure:
+        except (InputError, _core.InvalidArgument, _core.MissingLibrary, OSError) as failure:
             raise _fail(str(failure), EXIT_INPUT) from None
         except MemoryError:
             raise _fail("not enough memory for images and maps of this size", EXIT_INPUT) from None

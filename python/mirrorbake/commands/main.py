@@ -6,6 +6,9 @@ interrupted. Commands import what they need themselves: `--help` should not wait
 
 from __future__ import annotations
 
+import codecs
+import io
+import sys
 from typing import Annotated
 
 import typer
@@ -61,6 +64,14 @@ def _root(
     pass
 
 
+def _print_utf8() -> None:
+    """Print UTF-8 in the C locale: as Python does by itself unless PYTHONUTF8=0 forbids it."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and codecs.lookup(stream.encoding).name == "ascii":
+            stream.reconfigure(encoding="utf-8", errors="surrogateescape")
+
+
 def main() -> None:
     """Run the command line; never returns."""
+    _print_utf8()
     app()

@@ -62,6 +62,44 @@ float levelOfDetail(vec3 lookup, vec3 dx, vec3 dy, float size) {
   return clamp(log2(max(texels, 1.0)), 0.0, log2(size));
 }
 
+// The taps of a lookup: one, or pairs along the longer change of it, all of one level. They fade in as the footprint
+// grows longer, so that no rounding decides how many there are.
+struct Taps {
+  float level;
+  int pairs;  // 0: one tap in the middle
+  float spacing;
+  float cells;
+  vec3 longer;
+};
+
+Taps tapsOf(vec3 lookup, vec3 dx, vec3 dy, float size, float maxTaps) {
+  float x = texelsAcross(lookup, dx, size), y = texelsAcross(lookup, dy, size);
+  Taps taps = Taps(0.0, 0, 0.0, 1.0, y > x ? dy : dx);
+  if (!(max(x, y) > 1.0)) return taps;
+  taps.cells = clamp(max(x, y) / max(min(x, y), 1.0), 1.0, maxTaps);
+  taps.level = clamp(log2(max(x, y) / taps.cells), 0.0, log2(size));
+  if (taps.cells <= 1.25) return taps;
+  taps.pairs = int(ceil(0.5 * taps.cells));
+  taps.spacing = taps.pairs == 1 ? 0.5 * (taps.cells - 1.25) / 0.75 : 1.0 / taps.cells;
+  return taps;
+}
+
+int tapCount(Taps taps) {
+  return max(2 * taps.pairs, 1);
+}
+
+// Where a tap reads, and its share of the lookup.
+vec3 tapDirection(Taps taps, vec3 lookup, int tap, out float share) {
+  share = 1.0;
+  if (taps.pairs == 0) return lookup;
+  int pair = tap >> 1;
+  bool outermost = pair + 1 == taps.pairs;
+  share = (outermost ? 0.5 * taps.cells - float(pair) : 1.0) / taps.cells;
+  // The outermost of several pairs takes the middles of what the others leave.
+  float offset = outermost && pair > 0 ? 0.5 * (float(pair) / taps.cells + 0.5) : (float(pair) + 0.5) * taps.spacing;
+  return lookup + ((tap & 1) == 0 ? offset : -offset) * taps.longer;
+}
+
 // Shells front to back: call with the light and the transmittance so far, which begin with 0 and 1.
 void addShell(vec4 shell, inout vec3 light, inout float transmittance) {
   light += transmittance * shell.rgb;

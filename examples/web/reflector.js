@@ -12,7 +12,10 @@ export async function loadReflector(base, glb, name) {
   if (description.convention !== "threejs") throw new Error("the maps are not those of --convention threejs");
   const set = description.sets.find((candidate) => candidate.name === name);
   if (!set) throw new Error(`maps.json has no set ${name}`);
-  const lookups = await (await fetch(new URL("lookups.glsl", import.meta.url))).text();
+  const texts = ["lookups.glsl", "surface.glsl"].map(async (file) =>
+    (await fetch(new URL(file, import.meta.url))).text(),
+  );
+  const functions = (await Promise.all(texts)).join("\n");
   const gltf = await new GLTFLoader().loadAsync(glb);
   const textures = new Map();
   const meshes = [];
@@ -25,7 +28,7 @@ export async function loadReflector(base, glb, name) {
       if (!textures.has(shell.files[0])) textures.set(shell.files[0], await loadCube(`${base}/${shell.files[0]}`));
     }
     const diffuse = mesh.geometry.attributes._irradiance !== undefined;
-    const material = (stack) => shellMaterial(stack, textures, surface, description.footprintScale, lookups, diffuse);
+    const material = (stack) => shellMaterial(stack, textures, surface, description.runTime, functions, diffuse);
     // What lies on the convex hull cannot reflect the object itself.
     mesh.geometry.addGroup(0, stackIndices, 0);
     mesh.geometry.addGroup(stackIndices, mesh.geometry.index.count - stackIndices, 1);
@@ -60,8 +63,10 @@ async function loadCube(url) {
   return texture;
 }
 
-function shellMaterial(shells, textures, surface, footprintScale, lookups, diffuse) {
-  const uniforms = { footprintScale: { value: footprintScale } };
+function shellMaterial(shells, textures, surface, runTime, functions, diffuse) {
+  const uniforms = {};
+  const maxTaps = runTime.filter === "anisotropic" ? runTime.maxTaps : 1;
+  const { places, footprintScale } = runTime;
   const declarations = [];
   const reads = [];
   shells.forEach(({ proxy, files, size, channels }, i) => {
@@ -88,9 +93,15 @@ vec3 lookup${i}(vec3 p, vec3 d) {
 }`);
     // Files of the convention threejs are read with -x, as by the shaders of three.js.
     reads.push(`
-      vec3 at${i} = lookup${i}(p, r);
-      vec3 dx${i} = lookup${i}(p + sx, rx) - at${i}, dy${i} = lookup${i}(p + sy, ry) - at${i};
-      vec4 value${i} = textureLod(map${i}, vec3(-at${i}.x, at${i}.yz), levelOfDetail(at${i}, dx${i}, dy${i}, ${size}.0));
+      vec3 at${i} = lookup${i}(s.p, s.r);
+      vec3 dx${i} = lookup${i}(s.p + s.px, s.r + s.rx) - at${i}, dy${i} = lookup${i}(s.p + s.py, s.r + s.ry) - at${i};
+      Taps taps${i} = tapsOf(at${i}, dx${i}, dy${i}, ${size}.0, ${maxTaps}.0);
+      vec4 value${i} = vec4(0.0);
+      for (int tap = 0; tap < tapCount(taps${i}); ++tap) {
+        float share;
+        vec3 d = tapDirection(taps${i}, at${i}, tap, share);
+        value${i} += share * textureLod(map${i}, vec3(-d.x, d.yz), taps${i}.level);
+      }
       ${channels === 4 ? "" : `value${i}.a = 1.0;`}
       addShell(value${i}, light, transmittance);`);
   });
@@ -114,26 +125,16 @@ vec3 lookup${i}(vec3 p, vec3 d) {
       }`,
     fragmentShader: `
       in vec3 position_, normal_, irradiance_;
-      uniform float footprintScale;
-      ${lookups}
+      ${functions}
       ${declarations.join("\n")}
       void main() {
-        vec3 position = position_, normal = normal_;
-        vec3 px = dFdx(position), py = dFdy(position), nx = dFdx(normal), ny = dFdy(normal);
-        // The maps are inferred for lookups of so small a footprint that together they fill the pixel.
-        int side = int(1.0 / footprintScale + 0.5);
+        vec3 forward = -vec3(viewMatrix[0].z, viewMatrix[1].z, viewMatrix[2].z);
+        const vec2 places[${places.length}] = vec2[](${places.map(([x, y]) => `vec2(${x.toFixed(6)}, ${y.toFixed(6)})`)});
         vec3 total = vec3(0.0);
-        for (int i = 0; i < side * side; ++i) {
-          vec2 at = (vec2(i % side, i / side) + 0.5) / float(side) - 0.5;
-          vec3 p = position + at.x * px + at.y * py;
-          vec3 n = normalize(normal + at.x * nx + at.y * ny);
-          vec3 v = normalize(cameraPosition - p);
-          vec3 r = reflect(-v, n);
-          // Reflections at the other sides of the lookup's footprint.
-          vec3 sx = footprintScale * px, sy = footprintScale * py;
-          vec3 rx = reflect(normalize(p + sx - cameraPosition), normalize(n + footprintScale * nx));
-          vec3 ry = reflect(normalize(p + sy - cameraPosition), normalize(n + footprintScale * ny));
-          float c = dot(n, v);
+        // The maps were inferred for just these lookups.
+        for (int i = 0; i < ${places.length}; ++i) {
+          Reflection s = reflectionAt(position_, normal_, cameraPosition, forward, places[i], ${footprintScale.toFixed(6)});
+          float c = dot(s.n, s.v);
           vec3 light = vec3(0.0);
           float transmittance = 1.0;
           ${reads.join("\n")}
@@ -141,7 +142,7 @@ vec3 lookup${i}(vec3 p, vec3 d) {
           vec3 body = irradiance_ * vec3(${surface.albedo}) * ${1 / Math.PI};
           total += f * light + ${surface.layers === "coated" ? "(1.0 - f) * body" : "body"};
         }
-        gl_FragColor = vec4(total / float(side * side), 1.0);
+        gl_FragColor = vec4(total / ${places.length}.0, 1.0);
         #include <colorspace_fragment>
       }`,
   });

@@ -253,7 +253,7 @@ def test_textures_of_the_material_go_with_it() -> None:
         described, _ = gltf_material(core)
         described.setdefault("extensions", {})
         file = GlbFile()
-        add_textures(described, first, materials.textures, file, 32)
+        add_textures(described, first, materials.textures, file, 32, {})
         file.document["materials"] = [described]
         glb = Glb(file.to_bytes())
         material = glb.json["materials"][0]

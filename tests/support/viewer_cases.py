@@ -20,10 +20,11 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.pem.export.images import ImageFormat
+from mirrorbake.pem.export.map_sets import run_time_attributes
 from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
 from mirrorbake.pem.export.radiance_code import RadianceCode
-from mirrorbake.pem.export.source import ExportSource, MapEntry, Part, Shell, run_time_attributes
+from mirrorbake.pem.export.source import ExportSource, MapEntry, Part, Shell
 from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.pem.pyramid import FACES, Projection, topology_of
 from mirrorbake.pem.run_time import fade_weight

@@ -127,7 +127,13 @@ def _export_maps(
     sample: int | None,
     all_samples: bool,
 ) -> None:
-    from mirrorbake.pem.export.map_sets import axis_descriptions, footprint_scale, sample_set, static_set
+    from mirrorbake.pem.export.map_sets import (
+        axis_descriptions,
+        fade_degrees,
+        run_time_of,
+        sample_set,
+        static_set,
+    )
     from mirrorbake.pem.export.maps import DESCRIPTION_NAME, export_maps
     from mirrorbake.pem.store import PemStore
 
@@ -146,8 +152,9 @@ def _export_maps(
         sets(),
         out,
         axes=axis_descriptions(store.header.space),
-        footprint=footprint_scale(store),
         origin=store.header.origin,
+        run_time=run_time_of(store),
+        fade_degrees=fade_degrees(store),
         format=format,
         convention=convention,
         precision=precision,

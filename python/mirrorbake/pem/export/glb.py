@@ -10,7 +10,13 @@ from mirrorbake import _core
 from mirrorbake.files import atomic_output, check_writable
 from mirrorbake.pem.export.glb_file import GlbFile
 from mirrorbake.pem.export.gltf_material import add_textures, fresnel_description, gltf_material
-from mirrorbake.pem.export.map_sets import axis_descriptions, footprint_scale, sample_set, static_set
+from mirrorbake.pem.export.map_sets import (
+    axis_descriptions,
+    fade_degrees,
+    run_time_of,
+    sample_set,
+    static_set,
+)
 from mirrorbake.pem.export.materials import export_materials
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
 
@@ -24,7 +30,7 @@ if TYPE_CHECKING:
     from mirrorbake.scene.build import BuiltScene
 
 EXTENSION = "EXT_mirrorbake_pem"
-EXTENSION_VERSION = 1
+EXTENSION_VERSION = 2
 TEXTURE_SIZE = 2048
 """Pixels along a side that textures of the material have at most."""
 _BRIGHT_PERCENTILE = 99.0
@@ -38,7 +44,7 @@ def export_glb(
     samples: Sequence[int] = (),
     report: Callable[[str], None] | None = None,
 ) -> None:
-    """Write the reflector's mesh, its material, the static set and, if wanted, maps of samples.
+    """Write the reflector's mesh, its materials, the static set and, if wanted, maps of samples.
 
     Parameters
     ----------
@@ -67,27 +73,22 @@ def export_glb(
         yield from (sample_set(store, index) for index in samples)
 
     file = GlbFile()
-    material = built.scene.material(built.scene.object_material(built.reflector))
-    described, notes = gltf_material(material)
-    exported = export_materials(built.scene, [built.scene.object_material(built.reflector)])
-    notes += exported.notes
-    if len(set(built.scene.object_part_materials(built.reflector))) > 1:
-        notes.append(f"the materials of all parts but the first are left out: all are of {material.name}")
-    described.setdefault("extensions", {})
-    add_textures(described, exported.materials[0], exported.textures, file, TEXTURE_SIZE)
+    of_part = built.scene.object_part_materials(built.reflector)
+    numbers = sorted(set(of_part))
+    exported = export_materials(built.scene, numbers)
+    described, notes = _add_materials(file, built, numbers, exported)
     code = _code_for(sets())
-    extension = {
+    extension: dict[str, Any] = {
         "version": EXTENSION_VERSION,
-        "footprintScale": footprint_scale(store),
+        "runTime": run_time_of(store),
         "axes": axis_descriptions(store.header.space),
         "radianceCode": {"low": code.low, "high": code.high, "epsilon": code.epsilon},
         "sets": [_add_set(file, maps, code) for maps in sets()],
     }
-    described["extensions"][EXTENSION] = {
-        "fresnel": fresnel_description(material.fresnel),
-        "layers": material.layers,
-        "albedo": list(material.albedo),
-    }
+    if fade_degrees(store) is not None:
+        extension["fadeDegrees"] = fade_degrees(store)
+    materials = [numbers.index(number) for number in of_part]
+    primitives = _add_mesh(file, store, built, exported, materials)
     file.document.update(
         {
             "asset": {"version": "2.0", "generator": f"mirrorbake {_core.version()}"},
@@ -96,8 +97,8 @@ def export_glb(
             "scene": 0,
             "scenes": [{"nodes": [0]}],
             "nodes": [_node(store)],
-            "meshes": [{"name": "reflector", "primitives": _add_mesh(file, store, built, exported)}],
-            "materials": [described],
+            "meshes": [{"name": "reflector", "primitives": primitives}],
+            "materials": described,
         }
     )
     if any(axis.name == "motion" for axis in store.header.space.axes):
@@ -108,6 +109,26 @@ def export_glb(
     for note in notes if report is not None else ():
         assert report is not None
         report(note)
+
+
+def _add_materials(
+    file: GlbFile, built: BuiltScene, numbers: Sequence[int], exported: Materials
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return glTF's materials, and a sentence for each thing that they lack."""
+    result, notes, added = [], list(exported.notes), dict[int, int]()
+    for number, entry in zip(numbers, exported.materials, strict=True):
+        material = built.scene.material(number)
+        described, lacking = gltf_material(material)
+        notes += lacking
+        described.setdefault("extensions", {})
+        add_textures(described, entry, exported.textures, file, TEXTURE_SIZE, added)
+        described["extensions"][EXTENSION] = {
+            "fresnel": fresnel_description(material.fresnel),
+            "layers": material.layers,
+            "albedo": list(material.albedo),
+        }
+        result.append(described)
+    return result, list(dict.fromkeys(notes))
 
 
 def _extensions_in(value: Any) -> set[str]:
@@ -179,9 +200,9 @@ def _proxy(description: dict[str, Any]) -> dict[str, Any]:
 
 
 def _add_mesh(
-    file: GlbFile, store: PemStore, built: BuiltScene, materials: Materials
+    file: GlbFile, store: PemStore, built: BuiltScene, exported: Materials, materials: Sequence[int]
 ) -> list[dict[str, Any]]:
-    """One primitive per part; in each, triangles on the hull come last."""
+    """One primitive for each part and its material; in each, triangles on the hull come last."""
     mesh = built.scene.object_mesh(built.reflector)
     attributes = {"POSITION": file.add_vertices(np.asarray(built.positions, np.float32), bounds=True)}
     if len(mesh.normals):
@@ -191,28 +212,28 @@ def _add_mesh(
         uvs[:, 1] += 1.0  # v down
         attributes["TEXCOORD_0"] = file.add_vertices(uvs)
     # A colour of glTF multiplies the base colour, which is the reflectance of a metal.
-    tinted = max(materials.materials[0].albedo) > 0.0 or materials.materials[0].colors_tint_reflectance
-    if len(mesh.colors) and tinted:
-        attributes["COLOR_0"] = file.add_vertices(np.asarray(mesh.colors, np.float32))
+    tinted = [max(entry.albedo) > 0.0 or entry.colors_tint_reflectance for entry in exported.materials]
+    colors = (
+        file.add_vertices(np.asarray(mesh.colors, np.float32)) if len(mesh.colors) and any(tinted) else None
+    )
     irradiance = store.read_irradiance()
     if irradiance is not None:
         attributes["_IRRADIANCE"] = file.add_vertices(irradiance)
     local = store.read_local_triangles()
     stacked = np.ones(len(built.triangles), np.bool_) if local is None else local != 0
     primitives = []
-    for number in range(len(built.part_names)):
-        chosen = built.parts == number
+    for part, material in enumerate(materials):
+        chosen = built.parts == part
         if not chosen.any():
             continue
         triangles = np.concatenate([built.triangles[chosen & stacked], built.triangles[chosen & ~stacked]])
+        own = {"COLOR_0": colors} if colors is not None and tinted[material] else {}
         primitives.append(
             {
-                "attributes": attributes,
+                "attributes": {**attributes, **own},
                 "indices": file.add_indices(triangles.reshape(-1)),
-                "material": 0,
-                "extensions": {
-                    EXTENSION: {"part": number, "stackIndices": 3 * int((chosen & stacked).sum())}
-                },
+                "material": material,
+                "extensions": {EXTENSION: {"part": part, "stackIndices": 3 * int((chosen & stacked).sum())}},
             }
         )
     return primitives

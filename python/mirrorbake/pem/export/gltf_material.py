@@ -57,16 +57,25 @@ def gltf_material(material: _core.Material) -> tuple[dict[str, Any], list[str]]:
 
 
 def add_textures(
-    described: dict[str, Any], material: Material, images: Sequence[TextureImage], file: GlbFile, largest: int
+    described: dict[str, Any],
+    material: Material,
+    images: Sequence[TextureImage],
+    file: GlbFile,
+    largest: int,
+    added: dict[int, int],
 ) -> None:
-    """Add the textures of a material to what `gltf_material` returned, at most `largest` pixels wide."""
+    """Add the textures of a material to what `gltf_material` returned, at most `largest` pixels wide.
+
+    `added` has the numbers in the file of images that are there already, and gets those of the others.
+    """
 
     def info(use: TextureUse) -> dict[str, Any]:
-        image = images[use.texture]
-        pixels = image.pixels(largest)
-        codes = linear_codes(pixels) if image.linear else srgb_codes(pixels)
-        number = file.add_texture(f"texture {use.texture}", codes, image.wrap)
-        return {"index": number, **_transform(use)}
+        if use.texture not in added:
+            image = images[use.texture]
+            pixels = image.pixels(largest)
+            codes = linear_codes(pixels) if image.linear else srgb_codes(pixels)
+            added[use.texture] = file.add_texture(f"texture {use.texture}", codes, image.wrap)
+        return {"index": added[use.texture], **_transform(use)}
 
     surface = described["pbrMetallicRoughness"]
     base = material.reflectance_texture if surface["metallicFactor"] > 0.0 else material.albedo_texture

@@ -5,14 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mirrorbake import _core
 from mirrorbake.errors import InputError, OptionError
+from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.shells import moved_proxy
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.header import Header
+    from mirrorbake.pem.shells import Shell
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.parameters import ParameterSpace, Point
 
@@ -67,9 +74,26 @@ def axis_descriptions(space: ParameterSpace) -> list[dict[str, Any]]:
     ]
 
 
-def footprint_scale(store: PemStore) -> float:
-    """Size of a lookup's footprint in pixels for which the maps were inferred."""
-    return float(store.header.run_time["footprint_scale"])
+def run_time_of(store: PemStore) -> dict[str, Any]:
+    """How the maps are to be read, as they were when they were inferred, as plain values."""
+    return run_time_attributes(model_of(store.header.run_time))
+
+
+def run_time_attributes(model: _core.RunTimeModel) -> dict[str, Any]:
+    """Return plain values of what a renderer needs to know of a run-time model."""
+    return {
+        "name": model.name,
+        "places": [list(place) for place in model.places],
+        "footprintScale": model.footprint_scale,
+        "filter": model.filter,
+        "maxTaps": model.max_taps,
+    }
+
+
+def fade_degrees(store: PemStore) -> float | None:
+    """Degrees beyond the samples at which half of what is drawn is the static set; None if there is none."""
+    fade = store.header.static["fade"]
+    return None if fade is None else float(fade["degrees"])
 
 
 def require_cubes(store: PemStore) -> None:
@@ -83,9 +107,19 @@ def require_cubes(store: PemStore) -> None:
 
 
 def static_set(store: PemStore) -> MapSet:
-    """The set that needs no parameter: the captured surroundings, on the outermost shell's geometry."""
+    """The set that needs no parameter: the PEM's static set at the object's place at rest.
+
+    A PEM without one has the captured surroundings instead, on the outermost shell's geometry.
+    """
     require_cubes(store)
     header = store.header
+    stored = store.read_static_maps()
+    if stored is not None:
+        texels = [
+            np.ascontiguousarray(values[:, : entry.channels])
+            for values, entry in zip(stored, header.maps, strict=True)
+        ]
+        return MapSet("static", None, _parts(header, texels.__getitem__, lambda shell: shell.proxy))
     proxy = header.static["proxy"] or header.static["infinite"]
     shell = ShellMap("static", proxy, header.map_size, _core.build_cube_pyramid(store.read_capture()))
     return MapSet("static", None, {part.name: [shell] for part in header.parts})
@@ -107,17 +141,33 @@ def sample_set(store: PemStore, index: int) -> MapSet:
     config = parse_config(header.source.config, str(store.location))
     place = header.space.scene_coordinates(header.space.sample(index))
     pose = Pose.of(config, place.get("motion", 0.0))
-    parts = {
-        part.name: [
-            ShellMap(
-                shell.name,
-                moved_proxy(shell.proxy, pose) if shell.moves else shell.proxy,
-                header.map_size,
-                store.read_map(part.name, shell.name, index),
-                off_hull=shell.polygons == "off hull",
-            )
-            for shell in part.shells
-        ]
-        for part in header.parts
-    }
+    readers = {header.map_of(*name): name for name in header.map_names()}
+    parts = _parts(
+        header,
+        lambda number: store.read_map(*readers[number], index),
+        lambda shell: moved_proxy(shell.proxy, pose) if shell.moves else shell.proxy,
+    )
     return MapSet(f"sample-{index:04d}", header.space.sample(index), parts)
+
+
+def _parts(
+    header: Header, read: Callable[[int], FloatArray], proxy_of: Callable[[Shell], dict[str, Any]]
+) -> dict[str, list[ShellMap]]:
+    """Return the shells of all parts; those that are the same in several parts are one object."""
+    known: list[tuple[Shell, ShellMap]] = []
+
+    def entry(part: str, shell: Shell) -> ShellMap:
+        for other, made in known:
+            if other == shell:
+                return made
+        made = ShellMap(
+            shell.name,
+            proxy_of(shell),
+            header.map_size,
+            read(header.map_of(part, shell.name)),
+            off_hull=shell.polygons == "off hull",
+        )
+        known.append((shell, made))
+        return made
+
+    return {part.name: [entry(part.name, shell) for shell in part.shells] for part in header.parts}

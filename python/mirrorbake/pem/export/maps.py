@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mirrorbake.pem.export.map_sets import MapSet, ShellMap
 
 DESCRIPTION_NAME = "maps.json"
-DESCRIPTION_VERSION = 1
+DESCRIPTION_VERSION = 2
 
 FORMATS = ("ktx2", "exr")
 PRECISIONS = ("half", "float32")
@@ -35,8 +35,9 @@ def export_maps(
     convention: str = "threejs",
     precision: str = "half",
     axes: Sequence[Mapping[str, Any]] = (),
-    footprint: float = 1.0,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
+    run_time: Mapping[str, Any] | None = None,
+    fade_degrees: float | None = None,
     report: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
     """Write sets of maps and a `maps.json` that says what they are.
@@ -58,10 +59,10 @@ def export_maps(
         Of the files. `float32` keeps the values of all levels exactly; `half` rounds them.
     axes
         Of the parameter space, for the description.
-    footprint
-        Size of a lookup's footprint in pixels for which the maps were inferred, for the description.
     origin
         Where the zero of the maps' positions lies in the scene file's world, metres, for the description.
+    run_time, fade_degrees
+        How the maps are to be read, and how they fade to the static set, for the description.
     report
         Called with a sentence for each thing to know, such as values that were clamped.
 
@@ -90,8 +91,9 @@ def export_maps(
         "lookup_from_space": (frame.lookup_matrix @ frame.space_matrix.T).tolist(),
         "radiance": "scene-linear, Rec.709 primaries; four channels: premultiplied by the fourth, alpha",
         "shells": "front to back: L = L0 + (1 - a0) (L1 + (1 - a1) (...))",
-        "footprintScale": footprint,
         "origin": (frame.space_matrix @ np.array(origin)).tolist(),
+        "runTime": None if run_time is None else dict(run_time),
+        "fadeDegrees": fade_degrees,
         "axes": list(axes),
         "sets": [],
     }

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mirrorbake.pem.export.map_sets import run_time_attributes
 from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
 from mirrorbake.pem.pyramid import pyramid_of
@@ -14,7 +15,6 @@ from mirrorbake.pem.pyramid import pyramid_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from mirrorbake import _core
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.opened import OpenedPem
     from mirrorbake.pem.pyramid import Projection
@@ -174,17 +174,6 @@ def export_source(pem: OpenedPem) -> ExportSource:
         title=_title(header.source.config),
         notes=materials.notes,
     )
-
-
-def run_time_attributes(model: _core.RunTimeModel) -> dict[str, Any]:
-    """Return plain values of what the page needs to know of a run-time model."""
-    return {
-        "name": model.name,
-        "places": [list(place) for place in model.places],
-        "footprintScale": model.footprint_scale,
-        "filter": model.filter,
-        "maxTaps": model.max_taps,
-    }
 
 
 def _camera(pem: OpenedPem) -> dict[str, Any]:

@@ -275,3 +275,63 @@ def test_textures_of_the_material_go_with_it() -> None:
         assert ("specularColorTexture" in material["extensions"].get("KHR_materials_specular", {})) == (
             base == "albedo"
         )
+
+
+TWO_MATERIALS = """mtllib two.mtl
+v 0 0 0
+v 1 0 0
+v 0 1 0
+v 0 0 1
+v 1 0 1
+v 0 1 1
+o front
+usemtl gold
+f 1 2 3
+f 4 5 6
+o side
+usemtl cloth
+f 1 3 4
+"""
+
+
+def test_every_part_has_its_own_material_and_the_static_set_is_the_pems(tmp_path: Path) -> None:
+    (tmp_path / "two.mtl").write_text(
+        "newmtl gold\nKs 0.9 0.7 0.2\nillum 3\nnewmtl cloth\nKd 0.2 0.4 0.6\nillum 1\n"
+    )
+    (tmp_path / "two.obj").write_text(TWO_MATERIALS)
+    config = parse_config(
+        {
+            "reflector": {"mesh": str(tmp_path / "two.obj")},
+            "views": {"count": 1, "size": [24, 24]},
+            "maps": {"size": 8, "distant": "infinite"},
+            "trace": {"samples": 2, "indirect": "none"},
+            "auto": {"quality": "draft"},
+            "static": {"views": 2},
+        },
+        "two",
+    )
+    bake(config, tmp_path / "pem")
+    store, built = PemStore.open(tmp_path / "pem"), build_scene(config)
+    export_glb(store, built, tmp_path / "two.glb")
+    glb = Glb((tmp_path / "two.glb").read_bytes())
+    assert [material["name"] for material in glb.json["materials"]] == ["gold", "cloth"]
+    by_part = {p["extensions"]["EXT_mirrorbake_pem"]["part"]: p for p in glb.primitives}
+    assert [by_part[part]["material"] for part in range(2)] == [0, 1]
+    assert [glb.json["accessors"][by_part[part]["indices"]]["count"] for part in range(2)] == [6, 3]
+    jsonschema.validate(glb.extension, SCHEMA)
+    fade = store.header.static["fade"]
+    assert glb.extension["fadeDegrees"] == fade["degrees"]
+    (static,) = glb.extension["sets"]
+    stored, code = store.read_static_maps(), glb.extension["radianceCode"]
+    assert stored is not None
+    for part in static["parts"]:
+        assert [shell["name"] for shell in part["shells"]] == [
+            shell.name for shell in store.header.parts[0].shells
+        ]
+        last = part["shells"][-1]
+        expected = stored[store.header.map_of(part["name"], last["name"]), : 6 * 64, :3]
+        step = (code["high"] - code["low"]) / 255.0
+        codes = read_level(glb, last, 0, "radiance").reshape(-1, 3).astype(np.float64)
+        radiance = np.maximum(np.exp2(code["low"] + codes * step) - code["epsilon"], 0.0)
+        bound = (np.maximum(expected, 0.0) + code["epsilon"]) * (2.0 ** (0.5 * step) - 1.0)
+        assert (np.abs(radiance - np.maximum(expected, 0.0)) <= 1.001 * bound + 1e-6).all()

@@ -7,6 +7,8 @@ Peers, in the order of the table:
   directions, drawn in proportion to the lobe, each read from the mip level that suits its density (Krivanek
   and Colbert 2008). Its time is that of NumPy; its error is that of the method;
 - a cone of texels, what cmft does for a Phong lobe: the sum, cut where the lobe is 1 % of its peak;
+- both maps of a cube convolved exactly, beside what a moving light costs for every frame ([AEM]): tracing a
+  cube in the furnished room, nine harmonics of 8² texels and levels of it, and shading from both;
 - skylibs (PyPI), `EnvironmentMap.blur`: a lobe of von Mises and Fisher;
 - three.js (npm), `PMREMGenerator` in headless Chromium, drawn by SwiftShader on the processor. Left out,
   with a message, where there is no Node.js or no Chromium.
@@ -29,8 +31,10 @@ from numpy.typing import NDArray
 
 from benchmarks import _three
 from benchmarks._report import Case, require, run, seconds
+from mirrorbake._core import TraceOptions, Tracer, make_room
 from mirrorbake.envmap import EnvMap
-from mirrorbake.prefilter import Prefilter, ggx, ggx_chain, lambert, phong, table
+from mirrorbake.prefilter import Prefilter, ggx, ggx_chain, irradiance, lambert, phong, prefilter, table
+from mirrorbake.prefilter.single_pass import CapturedLight
 from mirrorbake.projection import texel_directions
 
 if TYPE_CHECKING:
@@ -161,10 +165,37 @@ def cases() -> Iterator[Case]:
         "Phong 50, a texel", "ms", 1e3 * each, 1e3 * peer, "a cone of texels, NumPy",
         percentile(mine, expected), percentile(theirs, expected),
     )  # fmt: skip
+    yield from single_pass()
     yield blurred()
     yield from of_three_js()
     whole = seconds(lambda: ggx_chain(source, 256, 8), 1)
     yield Case("GGX chain 256², 8 levels", "ms", 1e3 * whole, 1e3, "what it may take", 0.0, 0.0)
+
+
+def single_pass() -> Iterator[Case]:
+    """What a light that moves costs for every frame, against both maps convolved exactly."""
+    room = make_room()
+    start = time.perf_counter()
+    tracer = Tracer(room)
+    built = time.perf_counter() - start
+    normals = np.random.default_rng(3).normal(size=(128 * 128, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    view = np.array([0.0, 0.0, 1.0])
+    for size in (8, 64):
+        capture = partial(tracer.capture_cube, [0, 0.2, 0], size, options=TraceOptions(samples_per_pixel=4))
+        cube = EnvMap.from_array(capture(), "cube")
+        light = CapturedLight.make(cube)
+        exact = Prefilter(cube).sample(lambert(), normals, scale="sum")
+        error = percentile(light.irradiance.sample(normals), exact.astype(np.float64))
+        both = seconds(lambda cube=cube: (irradiance(cube, 16), prefilter(cube, phong(225), 64)), 1)  # type: ignore[misc]
+        yield Case(
+            f"filter a cube of {size}²", "ms", 1e3 * seconds(partial(CapturedLight.make, cube)), 1e3 * both,
+            "B1 and Phong 225 exactly", error, 0.0,
+        )  # fmt: skip
+        traced = seconds(capture, 1)
+        yield Case(f"trace a cube of {size}²", "ms", 1e3 * traced, 1e3 * built, "scene made ready", 0.0, 0.0)
+        shaded = seconds(partial(light.shade, normals, view, bias=2.25), 1)
+        yield Case("shade 128² pixels", "ms", 1e3 * shaded, 1e3 * traced, "their cube", 0.0, 0.0)
 
 
 def blurred() -> Case:
@@ -201,15 +232,16 @@ def of_three_js() -> Iterator[Case]:
         f"GGX chain {made.size}², {made.levels} levels", "ms", 1e3 * time_of_ours, made.milliseconds,
         name + ", SwiftShader", 0.0, 0.0,
     )  # fmt: skip
-    for roughness, values in made.found:
+    for level, (roughness, values) in enumerate(made.found, 1):
         alpha = roughness**2
         expected = all_texels(source, ggx_weight(alpha), axes)
-        of_level = partial(ours.sample, ggx(alpha), axes.astype(np.float32))
-        each = seconds(of_level, 1) / LOOKED_AT
+        size = made.size >> level
+        each = seconds(partial(ours.apply, ggx(alpha), size), 1) / (6 * size * size)
+        mine = ours.sample(ggx(alpha), axes.astype(np.float32))
         texels = sum(6 * (made.size >> level) ** 2 for level in range(made.levels))
         yield Case(
             f"GGX α = {alpha:.3g}, a texel", "ms", 1e3 * each, made.milliseconds / texels, name,
-            percentile(of_level(), expected), percentile(values, expected),
+            percentile(mine, expected), percentile(values, expected),
         )  # fmt: skip
 
 

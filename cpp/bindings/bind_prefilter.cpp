@@ -157,6 +157,20 @@ void bind_prefilter(nb::module_& m) {
       },
       nb::arg("layout"), nb::arg("values"), nb::arg("order"),
       "Coefficients ((order + 1)^2, channels) of the finest level.");
+  m.def(
+      "harmonic_basis",
+      [](PointArray directions, int order) {
+        const std::size_t count = directions.shape(0);
+        const std::size_t size = static_cast<std::size_t>((order + 1) * (order + 1));
+        std::vector<double> values(count * size);
+        const auto* d = reinterpret_cast<const glm::vec3*>(directions.data());
+        for (std::size_t i = 0; i < count; ++i) {
+          harmonic_basis(glm::dvec3(d[i]), order, std::span(values).subspan(i * size, size));
+        }
+        return to_numpy(std::move(values), {count, size});
+      },
+      nb::arg("directions"), nb::arg("order"),
+      "Values (n, (order + 1)^2) of all functions in unit directions (n, 3).");
   m.def("lambert_factor", &lambert_factor, nb::arg("band"), "What a cosine lobe multiplies a band by.");
   m.def(
       "lambert_harmonics",

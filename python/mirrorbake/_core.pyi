@@ -1984,6 +1984,9 @@ def chain_alpha(level: int, levels: int, roughness: Literal['squared', 'linear']
 def project_harmonics(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], order: int) -> NDArray[numpy.float64]:
     """Coefficients ((order + 1)^2, channels) of the finest level."""
 
+def harmonic_basis(directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], order: int) -> NDArray[numpy.float64]:
+    """Values (n, (order + 1)^2) of all functions in unit directions (n, 3)."""
+
 def lambert_factor(band: int) -> float:
     """What a cosine lobe multiplies a band by."""
 

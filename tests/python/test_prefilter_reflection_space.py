@@ -127,9 +127,9 @@ def test_a_disc_of_triangles_comes_near_to_the_warp_of_every_texel(sky: EnvMap) 
     view = np.array([0.3, 0.5, 0.8])
     for warp in WARPS:
         exact = maps.at(view, warp=warp)
-        found = [psnr(maps.at(view, warp=warp, rings=rings), exact) for rings in (3, 8, 24)]
+        found = [psnr(maps.at(view, warp=warp, rings=rings), exact) for rings in (3, 6, 12)]
         assert found == sorted(found), warp
-        assert found[-1] > 30, warp
+        assert found[-1] > 25, warp
     with pytest.raises(InvalidArgument, match="rings is 1"):
         maps.at(view, rings=1)
 

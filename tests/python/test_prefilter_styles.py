@@ -29,12 +29,27 @@ def test_levels_are_read_as_they_are_and_blended_in_between(cube: EnvMap) -> Non
 
 
 def test_coarser_levels_are_like_broader_lobes(cube: EnvMap) -> None:
-    found = [exponent_for_level(cube, level, 8) for level in (1.0, 2.25, 4.0)]
+    found = [exponent_for_level(cube, level, 11) for level in (1.0, 2.25, 4.0)]
     exponents = [exponent for exponent, _ in found]
     assert exponents == sorted(exponents, reverse=True)
     # A level halves the resolution: a quarter of the exponent, within a factor of two for boxes.
     assert 2 < exponents[0] / exponents[1] < 20
     assert all(error < 0.2 for _, error in found)
+
+
+def test_the_papers_225_lies_between_the_exponents_of_two_sizes() -> None:
+    # [AEM] figure 5 sets b = 2.25 beside N = 225 and does not say for which map. Of windows under a sky that
+    # is between faces of 32² and 64²: a level has a quarter of the exponent of the one before it.
+    d = texel_directions("latlong", 256, 128)
+    sky = np.where(d[..., 1:2] > 0, [0.35, 0.55, 0.9], [0.25, 0.2, 0.15])
+    windows = (np.sin(9 * np.arctan2(d[..., 0], -d[..., 2])) > 0.3) & (np.abs(d[..., 1] - 0.25) < 0.18)
+    sky[windows] = [3.0, 2.6, 2.0]
+    source = EnvMap.from_array(sky.astype(np.float32), "latlong")
+    small, large = (
+        exponent_for_level(source.resample("cube", size).mips("box"), 2.25, 11)[0] for size in (32, 64)
+    )
+    assert small < 225 < large
+    assert 2 < large / small < 8
 
 
 @pytest.mark.parametrize("name", STYLES)

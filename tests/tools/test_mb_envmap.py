@@ -329,6 +329,20 @@ def test_rotate_keeps_projection_and_size_and_a_turn_back_restores(tmp_path: Pat
     np.testing.assert_allclose(EnvMap.load(back).values, (2 + d).ravel(), atol=0.03)
 
 
+def test_a_fisheye_photograph_of_the_sky_is_brought_to_its_place(tmp_path: Path) -> None:
+    # Taken straight up: red in the middle, green at its top, white elsewhere, the horizon on the rim.
+    place = (np.arange(64) + 0.5) / 32 - 1
+    x, y = np.meshgrid(place, -place)
+    photograph = np.ones((64, 64, 3), np.float32)
+    photograph[np.hypot(x, y) < 0.2] = [9, 0, 0]
+    photograph[y > 0.8] = [0, 9, 0]
+    EnvMap.from_array(photograph, "fisheye:180").save(tmp_path / "sky.exr", format="float32")
+    upwards = ("--from", "fisheye:180", "--to", "latlong", "--axis", 1, 0, 0, "--turn", -90)
+    mb_envmap("convert", tmp_path / "sky.exr", *upwards, "-o", tmp_path / "out.exr")
+    seen = EnvMap.load(tmp_path / "out.exr").sample([[0, 1, 0], [0, 0.2, 1], [0, 0.2, -1], [0, -1, 0]])
+    np.testing.assert_allclose(seen, [[9, 0, 0], [0, 9, 0], [1, 1, 1], [0, 0, 0]], atol=1e-5)
+
+
 def test_preview_is_tone_mapped_as_everywhere(tmp_path: Path) -> None:
     values = np.random.default_rng(3).random((16, 32, 3), np.float32) ** 4 * 20
     EnvMap.from_array(values, "latlong").save(tmp_path / "in.exr", format="float32")

@@ -15,6 +15,7 @@ from mirrorbake.arrays import real_array
 from mirrorbake.envmap import EnvMap
 from mirrorbake.files import read_text, write_text
 from mirrorbake.prefilter.convolve import irradiance
+from mirrorbake.projection import vectors
 from mirrorbake.resample import height_and_width
 
 if TYPE_CHECKING:
@@ -95,6 +96,13 @@ class Harmonics:
         return EnvMap.from_array(
             EnvMap(layout, values, [str(c) for c in range(layout.channels)]).level(), projection
         )
+
+    def sample(self, directions: ArrayLike, *, negative: NegativeLight = "clamp") -> NDArray[np.float64]:
+        """Return the sums (..., C) in unit directions (..., 3), sums below 0 as for `evaluate`."""
+        d = vectors("directions", directions, 3)
+        basis = _core.harmonic_basis(d.reshape(-1, 3), self.order)
+        sums: NDArray[np.float64] = (basis @ self.coefficients).reshape(*d.shape[:-1], -1)
+        return np.maximum(sums, 0) if negative == "clamp" else sums
 
     def shader_constants(self) -> NDArray[np.float64]:
         """(9, C) for E/π = c₀ + c₁y + c₂z + c₃x + c₄xy + c₅yz + c₆(3z² − 1) + c₇xz + c₈(x² − y²).

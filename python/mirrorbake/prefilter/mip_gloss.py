@@ -35,7 +35,7 @@ def sample_level(envmap: EnvMap, directions: ArrayLike, level: float) -> NDArray
     return envmap.sample(directions, filter="trilinear", level=level)
 
 
-def exponent_for_level(envmap: EnvMap, level: float, size: int = 16) -> tuple[float, float]:
+def exponent_for_level(envmap: EnvMap, level: float, size: int = 21) -> tuple[float, float]:
     """Exponent of the normalised Phong lobe that a level is most like, and how unlike it still is.
 
     Parameters
@@ -46,7 +46,8 @@ def exponent_for_level(envmap: EnvMap, level: float, size: int = 16) -> tuple[fl
     level
         Or bias.
     size
-        Faces of the cube at whose texels both are compared.
+        Faces of the cube at whose texels both are compared. An odd number: texels of sizes that divide the
+        map's lie where several levels have the same values.
 
     Returns
     -------

@@ -242,8 +242,10 @@ def between_views(
         The angle from the corner, and the peak signal-to-noise ratio against `radiance_map` of that view
         within the disc; of the corner itself it is that of reading the map between its texels.
     """
-    maps = RadianceMaps.make(envmap, brdf, size, refinements)
-    corners = maps.views[maps.triangles[0]]
+    views, triangles = geodesic(refinements)
+    corners = views[triangles[0]]
+    seen = [radiance_map(envmap, brdf, corner, size) for corner in corners]
+    maps = RadianceMaps(corners, np.arange(3)[None], seen)
     middle = corners.mean(0)
     inside = np.hypot(*np.meshgrid(*2 * [(np.arange(size) + 0.5) / size * 2 - 1])) < 0.95
     found = []

@@ -18,10 +18,13 @@ from mirrorbake.bake.analyze import (
     analyze,
 )
 from mirrorbake.bake.bake import bake
+from mirrorbake.bake.count_parts import disagreement
+from mirrorbake.bake.probe import Probe
 from mirrorbake.errors import InputError
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import prepare_stage
+from mirrorbake.scene.surface_parts import split_surface
 
 from .gltf_scene import SQUARE, SQUARE_TRIANGLES, GlbScene
 
@@ -75,7 +78,9 @@ def test_a_convex_black_mirror_needs_the_distant_layer_alone(tmp_path: Path) -> 
 
 
 def test_a_ring_reflects_itself_and_paint_is_diffuse(tmp_path: Path) -> None:
-    plan = analyze(make_stage(tmp_path, RING, material={"albedo": [0.5, 0.1, 0.1]}))
+    plan = analyze(
+        make_stage(tmp_path, RING, reflector={"parts": "split"}, material={"albedo": [0.5, 0.1, 0.1]})
+    )
     assert plan.has_diffuse
     assert plan.has_local("object")
     for key in ("layers.diffuse", "layers.local"):
@@ -173,13 +178,14 @@ def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
     stage = make_stage(
         tmp_path,
         CONVEX,
+        reflector={"parts": "split"},
         layers={"diffuse": True, "local": True, "hull_split": False},
         maps={"size": 32, "distant": "infinite"},
         trace={"depth": 5},
     )
     plan = analyze(stage)
     decided = [decision for decision in plan.decisions if not decision.automatic]
-    assert [decision.value for decision in decided] == [5, 4, True, True, False, "infinite", 32]
+    assert [decision.value for decision in decided] == ["split", 5, 4, True, True, False, "infinite", 32]
     assert all(decision.reason == SET for decision in decided)
     # What the quality decides needs no measuring.
     assert all(decision.reason.startswith("normal quality") for decision in plan.decisions[len(decided) :])
@@ -244,3 +250,37 @@ def test_a_reflector_that_no_view_sees_needs_nothing(tmp_path: Path) -> None:
     )
     assert (plan.depth, plan.has_local("object"), plan.map_size) == (0, False, SMALLEST_MAP)
     assert plan.distant["shape"] == "infinite"
+
+
+def test_a_surface_is_cut_where_equal_reflections_want_different_light(tmp_path: Path) -> None:
+    """Two balls on a chequered ground: rays that both send into one direction end at different squares."""
+    low = _core.make_sphere((-1.2, 0.5, 0.0), 0.5, 24)
+    count = len(low.positions)
+    pair = _core.TriangleMesh(
+        np.concatenate([low.positions, low.positions + np.array([2.4, 0.0, 0.0], np.float32)]),
+        np.concatenate([low.triangles, low.triangles + np.uint32(count)]),
+    )
+    room = {"panorama": None, "room": "furnished"}
+    stage = make_stage(tmp_path, pair, reflector={"height": 0.1}, surroundings=room)
+    decision = of(analyze(stage), "reflector.parts")
+    assert decision.automatic
+    assert isinstance(decision.value, int)
+    assert decision.value >= 2
+    assert "by" in decision.reason
+    labels = split_surface(stage.built.positions, stage.built.triangles).parts(2)
+    # Of two parts each is a ball.
+    assert len(np.unique(labels[: len(low.triangles)])) == 1
+    assert labels[0] != labels[-1]
+    # The same samples in parts that do not collide differ less.
+    probe = Probe.of(stage, 2)
+    assert disagreement(probe, labels) < 0.8 * disagreement(probe, np.zeros_like(labels))
+
+
+def test_a_planned_stage_has_the_parts_that_were_decided(tmp_path: Path) -> None:
+    stage = make_stage(tmp_path, RING, reflector={"parts": 5})
+    assert stage.built.part_names == [f"part-{number}" for number in range(1, 6)]
+    assert stage.in_parts(5) is stage
+    other = stage.in_parts(3)
+    assert len(other.built.part_names) == 3
+    assert stage.in_parts(3) is other
+    np.testing.assert_array_equal(other.built.triangles, stage.built.triangles)

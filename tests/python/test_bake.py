@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # One degree between views, as in the paper, at a tenth of its pixels; light that bounces between diffuse
 # surfaces is left out since it costs the most to prepare.
 SMALL = {
-    "reflector": {"object": "teapot", "subdivisions": 12},
+    "reflector": {"object": "teapot", "subdivisions": 12, "parts": "split"},
     "views": {"count": 3, "degrees": 2.0, "start": 22.0, "size": [160, 120]},
     "maps": {"size": 64},
     "trace": {"samples": 8, "indirect": "none"},

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SMALL = {
-    "reflector": {"object": "teapot", "subdivisions": 8},
+    "reflector": {"object": "teapot", "subdivisions": 8, "parts": "split"},
     "views": {"count": 3, "degrees": 2.0, "start": 22.0, "size": [96, 72]},
     "maps": {"size": 32},
     "trace": {"samples": 8, "depth": 4, "indirect": "none"},

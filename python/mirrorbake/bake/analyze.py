@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.count_parts import parts_decision
 from mirrorbake.bake.probe import LOBE_PROBE_SAMPLES, Probe, probe_points, relative_change, relative_spread
 from mirrorbake.bake.quality import quality_decisions
 from mirrorbake.errors import InputError
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.scene.config import Parts
     from mirrorbake.scene.stage import Stage
 
     DoubleArray = NDArray[np.float64]
@@ -60,13 +63,18 @@ def analyze(stage: Stage) -> Plan:
     trace = stage.config.trace
     probe = Probe.of(stage, MAX_DEPTH if trace.depth is None else trace.depth)
     depth = _depth(stage, probe)
+    parts, labels = parts_decision(stage, probe)
+    stage = stage.in_parts(cast("Parts", parts.value))
     if depth.automatic and depth.value != MAX_DEPTH:
         probe = Probe.of(stage, int(depth.value))
+    elif labels is not None:
+        probe = replace(probe, part=labels[probe.triangle].astype(np.int64))
     distant, proxy = _distant(stage, probe)
     on_hull = hull_triangles(stage.built.positions, stage.built.triangles)[probe.triangle]
     local = _local(stage, probe, on_hull)
     samples = _samples(stage, int(depth.value))
     decisions = [
+        parts,
         depth,
         samples,
         _diffuse(stage, probe),

@@ -28,6 +28,12 @@ from mirrorbake.scene.config_views import Elevation, Light, Motion, Views
 ILLUMINANT: Final = "D65"
 """Under which the colours of metals are meant: the white of Rec.709."""
 
+MOST_PARTS: Final = 16
+"""Into which a surface is cut."""
+
+
+Parts: TypeAlias = Literal["split", "joined"] | Annotated[int, Field(ge=1, le=MOST_PARTS)]
+
 
 class Reflector(Section):
     """[reflector]: the shiny object. It stands on y = 0, the table's top or the ground."""
@@ -51,8 +57,11 @@ class Reflector(Section):
     """Where the centre of the object's base stands."""
     subdivisions: Annotated[int, Field(ge=1, le=128)] = 25
     """The teapot's tessellation: every patch becomes subdivisions² · 2 triangles."""
-    parts: Literal["split", "joined"] = "split"
-    """Whether each part (the teapot's lid and body, the objects of a file) gets maps of its own."""
+    parts: Annotated[Parts | None, *AUTO] = None
+    """Which triangles get maps of their own: `split`, each part that the object has (the teapot's lid and
+    body, the objects of a file); `joined`, all one; or a number of connected parts into which the surface is
+    cut such that points of a part which reflect alike lie together. "auto": as many as keep apart what the
+    views see differently."""
 
     @model_validator(mode="before")
     @classmethod
@@ -246,15 +255,15 @@ class Infer(Section):
     neighbours: Annotated[Annotated[float, Field(ge=0, le=1)] | None, *AUTO] = None
     """Of fit = "display": weight of the neighbouring samples' views in the fit of a sample. "auto": 0.3 where
     they are close, by `auto.quality`."""
-    smoothness: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
+    smoothness: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
     """Weight λ of differences between neighbouring texels: small fits the sampled view best, large survives
     longer away from it."""
-    level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
+    level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
     """Weight λ of a texel's difference from the mean of the four below it in the pyramid."""
     prior: Literal["smooth", "captured"] = "captured"
     """What the distant map's texels that a view does not determine fall back to: a smooth fill, or the
     captured surroundings."""
-    prior_weight: Annotated[float, Field(ge=0, le=1e6)] = 1e-3
+    prior_weight: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
     """Weight λ of the difference from the captured surroundings."""
     footprint_scale: Annotated[float, Field(gt=0, le=4)] = 0.25
     """Size of a lookup's footprint in pixels: 1 filters as graphics hardware does for one sample per pixel,

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from mirrorbake.scene.config import SceneConfig
 
 DECIDED_KEYS = (
+    "reflector.parts",
     "trace.depth",
     "trace.samples",
     "layers.diffuse",
@@ -114,6 +115,7 @@ class Plan:
 
         return config.model_copy(
             update={
+                "reflector": resolved("reflector", "parts"),
                 "trace": resolved("trace", "samples", "noise", "depth"),
                 "views": resolved("views", "traced"),
                 "infer": resolved("infer", "passes", "neighbours"),

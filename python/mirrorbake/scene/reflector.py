@@ -12,6 +12,7 @@ from mirrorbake.errors import InputError
 from mirrorbake.scene.config import ILLUMINANT, MaterialConfig, Reflector, SceneConfig
 from mirrorbake.scene.origin import loaded_nearby
 from mirrorbake.scene.pose import Pose, rotation_matrix
+from mirrorbake.scene.surface_parts import split_surface
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
 
 REFLECTOR_NAME = "reflector"
-MOST_PARTS = 8
+MOST_OBJECTS = 8
 """A file with more objects is split into parts by its materials: every part has maps of its own."""
 
 
@@ -62,6 +63,8 @@ def add_reflector(config: SceneConfig, scene: _core.Scene, pose: Pose) -> tuple[
     if reflector.scene_object is not None:
         return _scene_reflector(config, scene), []
     source = _source(config, scene)
+    if isinstance(reflector.parts, int):
+        source = _cut(source, reflector.parts)
     mesh = _placed(source.mesh, reflector, pose)
     materials = source.part_materials
     if materials:
@@ -78,14 +81,14 @@ def _source(config: SceneConfig, scene: _core.Scene) -> _Source:
     reflector = config.reflector
     if reflector.mesh is None:
         mesh = _core.make_teapot(reflector.subdivisions, reflector.height)
-        if reflector.parts == "split":
+        if reflector.parts != "joined":
             return _Source(mesh, list(_core.teapot_part_names()), [], [])
         return _Source(_without_parts(mesh), [reflector.object or "object"], [], [])
     if config.material is not None:
         return _Source(_load_mesh(reflector.mesh), ["object"], [], [])
     loaded = _load_objects(reflector.mesh)
     notes = [f"{reflector.mesh}: {w.message} ({w.count} times)" for w in loaded.warnings]
-    mesh, names, materials = loaded.scene.join_objects(MOST_PARTS)
+    mesh, names, materials = loaded.scene.join_objects(MOST_OBJECTS)
     if not any(loaded.scene.material(index).specular for index in materials):
         notes.append(
             f"{reflector.mesh}: no material of it shines, so it is a mirror; [material] says of what"
@@ -119,13 +122,29 @@ def _load_objects(path: str) -> _core.LoadedScene:
     return loaded
 
 
+def _cut(source: _Source, count: int) -> _Source:
+    """Return a reflector in a number of parts that keep materials apart."""
+    mesh, materials = source.mesh, source.part_materials
+    kind = np.asarray(materials)[mesh.parts] if materials and len(mesh.parts) else None
+    parts = split_surface(mesh.positions, mesh.triangles, kind).parts(count)
+    found = int(parts.max()) + 1
+    if kind is not None:
+        materials = [int(kind[parts == number][0]) for number in range(found)]
+    names = [f"part-{number + 1}" for number in range(found)]
+    return _Source(_with_parts(mesh, parts), names, materials, source.notes)
+
+
 def _without_parts(mesh: _core.TriangleMesh) -> _core.TriangleMesh:
+    return _with_parts(mesh, None)
+
+
+def _with_parts(mesh: _core.TriangleMesh, parts: NDArray[np.uint16] | None) -> _core.TriangleMesh:
     return _core.TriangleMesh(
         mesh.positions,
         mesh.triangles,
         mesh.normals if len(mesh.normals) else None,
         mesh.uvs if len(mesh.uvs) else None,
-        None,
+        parts,
         mesh.colors if len(mesh.colors) else None,
     )
 

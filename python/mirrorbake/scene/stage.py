@@ -11,7 +11,7 @@ from mirrorbake.scene.build import BuiltScene, build_scene
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.config import Parts, SceneConfig
     from mirrorbake.scene.parameters import ParameterSpace, Point, PointLike
     from mirrorbake.scene.plan import Plan
 
@@ -25,6 +25,8 @@ class Stage:
     tracer: _core.Tracer
     moved: dict[Point, Stage] = field(default_factory=dict, compare=False, repr=False)
     """The last stage that `at` made, by the coordinates that change the scene."""
+    cut: dict[Parts, Stage] = field(default_factory=dict, compare=False, repr=False)
+    """The last stage that `in_parts` made, by the parts of the reflector."""
     place: Mapping[str, float] = field(default_factory=dict)
     """Coordinates that have changed the scene, by axis; without any it is at rest."""
 
@@ -50,7 +52,21 @@ class Stage:
 
     def planned(self, plan: Plan) -> Stage:
         """Return the stage with what a plan decides in place of "auto", so that its views can be traced."""
-        return replace(self, config=plan.resolve(self.config))
+        config = plan.resolve(self.config)
+        assert config.reflector.parts is not None, "a plan decides the parts"
+        return replace(self.in_parts(config.reflector.parts), config=config)
+
+    def in_parts(self, parts: Parts) -> Stage:
+        """Return the stage with its reflector in other parts (`reflector.parts`)."""
+        before = self.config.reflector.parts
+        # What is "auto" is built as its file has it.
+        if parts == (before or "split") or self.config.reflector.scene_object is not None:
+            return self
+        if parts not in self.cut:
+            reflector = self.config.reflector.model_copy(update={"parts": parts})
+            self.cut.clear()
+            self.cut[parts] = _prepared(self.config.model_copy(update={"reflector": reflector}), None)
+        return self.cut[parts]
 
     @property
     def space(self) -> ParameterSpace:

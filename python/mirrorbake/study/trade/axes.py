@@ -123,11 +123,14 @@ def _blending(config: SceneConfig) -> Axis | None:
 
 
 def _parts(config: SceneConfig) -> Axis | None:
-    if config.reflector.object is None:
+    if config.reflector.scene_object is not None:
         return None
-    other = "joined" if config.reflector.parts == "split" else "split"
-    settings = (Setting(config.reflector.parts), Setting(other, {"reflector.parts": other}))
-    return Axis("parts", "parts with maps of their own", settings)
+    own = config.reflector.parts
+    settings = [Setting("as planned" if own is None else str(own))]
+    settings += [
+        Setting(str(other), {"reflector.parts": other}) for other in ("joined", "split", 4, 8) if other != own
+    ]
+    return Axis("parts", "parts with maps of their own", tuple(settings))
 
 
 def _shared(config: SceneConfig) -> Axis | None:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 # Small enough for a second a sample.
 TINY: dict[str, Any] = {
-    "reflector": {"object": "teapot", "subdivisions": 8},
+    "reflector": {"object": "teapot", "subdivisions": 8, "parts": "split"},
     "maps": {"size": 32, "distant": "infinite"},
     "trace": {"samples": 4, "depth": 2, "indirect": "none"},
     "auto": {"quality": "draft"},

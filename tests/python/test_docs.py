@@ -41,7 +41,7 @@ CANNOT_RUN = {
 }
 
 TINY: dict[str, dict[str, Any]] = {
-    "reflector": {"object": "teapot", "subdivisions": 3},
+    "reflector": {"object": "teapot", "subdivisions": 3, "parts": "split"},
     "views": {"count": 2, "size": [32, 32]},
     "maps": {"size": 8},
     "trace": {"samples": 1, "indirect": "none"},

@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[2]
 SCHEMA = json.loads((ROOT / "docs" / "reference" / "EXT_mirrorbake_pem.schema.json").read_text())
 SIZE = 16
 SMALL = {
-    "reflector": {"object": "teapot", "subdivisions": 4},
+    "reflector": {"object": "teapot", "subdivisions": 4, "parts": "split"},
     "material": {"albedo": 0.3, "fresnel": "dielectric", "ior": 1.6},
     "views": {"count": 2, "degrees": 2.0, "size": [48, 48]},
     "maps": {"size": SIZE},

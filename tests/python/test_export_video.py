@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SMALL = {
-    "reflector": {"object": "teapot", "subdivisions": 4},
+    "reflector": {"object": "teapot", "subdivisions": 4, "parts": "split"},
     "views": {"count": 3, "degrees": 30.0, "size": [63, 48]},
     "maps": {"size": 16},
     "trace": {"samples": 2, "indirect": "none"},

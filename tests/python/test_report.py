@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SMALL = {
-    "reflector": {"object": "teapot", "subdivisions": 6},
+    "reflector": {"object": "teapot", "subdivisions": 6, "parts": "split"},
     "views": {"count": 2, "degrees": 1.0, "start": 22.0, "size": [64, 48]},
     "maps": {"size": 16},
     "trace": {"samples": 4, "depth": 2, "indirect": "none"},

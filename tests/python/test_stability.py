@@ -109,7 +109,7 @@ def test_light_over_ten_orders_of_magnitude_keeps_its_dark_end(matrix: mb.Render
 # Whole bakes
 
 SCENE: dict[str, Any] = {
-    "reflector": {"object": "teapot", "subdivisions": 4},
+    "reflector": {"object": "teapot", "subdivisions": 4, "parts": "split"},
     "views": {"count": 2, "degrees": 1.0, "start": 22.0, "size": [40, 30]},
     "layers": {"diffuse": False},
     "maps": {"size": 16},

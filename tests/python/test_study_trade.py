@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SCENE: dict[str, Any] = {
-    "reflector": {"object": "teapot", "subdivisions": 4},
+    "reflector": {"object": "teapot", "subdivisions": 4, "parts": "split"},
     "views": {"count": 9, "degrees": 8.0, "start": 20.0, "size": [64, 48]},
     "layers": {"local": True, "hull_split": True, "diffuse": False},
     "maps": {"size": 16, "distant": "box"},
@@ -118,11 +118,13 @@ def test_every_axis_starts_with_the_scenes_own_choice() -> None:
     assert [s.label for s in axes[0].settings] == ["16", "4", "8", "32"]
 
 
-def test_a_mesh_has_no_parts_and_one_view_no_spacing(tmp_path: Path) -> None:
+def test_a_mesh_of_one_part_is_cut_and_one_view_has_no_spacing(tmp_path: Path) -> None:
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     scene = {**SCENE, "reflector": {"mesh": str(tmp_path / "flat.obj")}, "views": {"count": 1}}
-    names = {axis.name for axis in axes_of(prepare_stage(parse_config(scene, "scene")))}
-    assert not {"parts", "spacing", "blending", "shared"} & names
+    axes = {axis.name: axis for axis in axes_of(prepare_stage(parse_config(scene, "scene")))}
+    assert not {"spacing", "blending", "shared"} & axes.keys()
+    labels = [setting.label for setting in axes["parts"].settings]
+    assert labels == ["as planned", "joined", "split", "4", "8"]
 
 
 def test_spacing_keeps_the_middle_of_the_arc() -> None:

@@ -209,7 +209,7 @@ def test_the_guide_shows_the_file_that_the_example_uses() -> None:
 
 
 SMALL = {
-    "reflector": {"object": "teapot", "subdivisions": 12},
+    "reflector": {"object": "teapot", "subdivisions": 12, "parts": "split"},
     "views": {"count": 1, "size": [240, 180]},
     "maps": {"size": 32},
     "layers": {"local": True, "hull_split": True},

@@ -34,6 +34,7 @@ SCENE = """
 [reflector]
 object = "teapot"
 subdivisions = 4
+parts = "split"
 [views]
 count = 3
 degrees = 4

@@ -24,7 +24,7 @@ PLOT_NAME = "study.png"
 COST_TITLES = {
     "bytes_per_degree": "bytes of maps per degree of the arc",
     "bake_s": "seconds of baking per degree of the arc",
-    "draw_ms": "milliseconds to draw a frame",
+    "draw_ms": "milliseconds of one core to draw a frame",
 }
 SHOWN_COSTS = ("bytes_per_degree", "bake_s", "draw_ms")
 OWN = "the scene's own"

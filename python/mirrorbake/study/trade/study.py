@@ -184,7 +184,7 @@ _DECIDED = (
     *("trace.depth", "trace.samples", "trace.noise", "maps.size", "maps.distant"),
     *("views.traced", "infer.passes", "infer.neighbours"),
 )
-"""What all trials share of the plan; layers and their parts stay as each trial finds them."""
+"""What all trials share of the plan; with them the local layer, if all parts have one or none has."""
 
 
 def _studied(config: SceneConfig) -> Stage:
@@ -212,6 +212,9 @@ def _studied(config: SceneConfig) -> Stage:
         for decision in plan.decisions
         if decision.automatic and decision.key in _DECIDED
     }
+    local = {decision.value for decision in plan.decisions if decision.key == "layers.local"}
+    if len(local) == 1:
+        decided["layers.local"] = local.pop()
     return replace(stage, config=overridden(config, decided))
 
 
@@ -349,14 +352,16 @@ def advice(result: Study) -> list[str]:
     """Sentences that a person can act on: what can be saved for little, and what is worth its price."""
     base = result.base
     assert base.near is not None
-    savings, gains = [], []
+    ordered, gains = [], []
     nouns = ("the bytes", "the time to bake", "the time to draw")
     for cost, noun in zip(COSTS, nouns, strict=True):
+        savings = []
         for axis in result.axes:
             for trial in result.of_axis(axis.name):
                 if trial.near is None:
                     continue
-                ratio, change = getattr(trial, cost) / getattr(base, cost), trial.near - base.near
+                ratio = getattr(trial, cost) / max(getattr(base, cost), 1e-12)
+                change = trial.near - base.near
                 words = f"{axis.title}: {trial.settings[axis.name]}"
                 if ratio < 0.85 and change > -1.5:
                     effect = f"cost {-change:.1f} dB" if change <= -0.05 else "cost nothing"
@@ -365,7 +370,7 @@ def advice(result: Study) -> list[str]:
                     savings.append((price, f"{share(ratio)} {noun} {effect} ({words})"))
                 elif change > 0.3 and cost == "bake_s":
                     gains.append((change, f"{change:.1f} dB more for {share(ratio)} {noun} ({words})"))
-    ordered = [words for _, words in sorted(savings, reverse=True)[:4]]
+        ordered += [words for _, words in sorted(savings, reverse=True)[:2]]
     return ordered + [words for _, words in sorted(gains, reverse=True)[:3]]
 
 

@@ -180,12 +180,13 @@ def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
         CONVEX,
         reflector={"parts": "split"},
         layers={"diffuse": True, "local": True, "hull_split": False},
-        maps={"size": 32, "distant": "infinite"},
+        maps={"size": 32, "distant": "infinite", "shared_distant": False},
         trace={"depth": 5},
     )
     plan = analyze(stage)
     decided = [decision for decision in plan.decisions if not decision.automatic]
-    assert [decision.value for decision in decided] == ["split", 5, 4, True, True, False, "infinite", 32]
+    expected = ["split", 5, 4, True, True, False, "infinite", 32, False]
+    assert [decision.value for decision in decided] == expected
     assert all(decision.reason == SET for decision in decided)
     # What the quality decides needs no measuring.
     assert all(decision.reason.startswith("normal quality") for decision in plan.decisions[len(decided) :])
@@ -284,3 +285,62 @@ def test_a_planned_stage_has_the_parts_that_were_decided(tmp_path: Path) -> None
     assert len(other.built.part_names) == 3
     assert stage.in_parts(3) is other
     np.testing.assert_array_equal(other.built.triangles, stage.built.triangles)
+
+
+# What a scene would do without
+
+
+def test_a_captured_map_of_a_far_sky_leaves_nothing_to_a_pem(tmp_path: Path) -> None:
+    advice = analyze(make_stage(tmp_path, BALL)).advice
+    assert any(words.startswith("a PEM is not worth it: one captured map at infinity") for words in advice)
+    # Not asked of what is a static set itself.
+    alone = analyze(make_stage(tmp_path, BALL, views={"kind": "none", "count": 3}))
+    assert not any("a PEM" in words for words in alone.advice)
+
+
+def test_an_object_that_reflects_itself_is_worth_a_pem(tmp_path: Path) -> None:
+    stage = make_stage(tmp_path, RING, reflector={"rotation": [70.0, 0.0, 0.0]}, auto={"tolerance": 0.003})
+    assert any(words.startswith("a PEM is worth its bytes") for words in analyze(stage).advice)
+
+
+def test_one_lookup_does_where_reflections_are_straight_across_a_pixel(tmp_path: Path) -> None:
+    near = {"views": {"size": [256, 256]}}
+    flat = analyze(make_stage(tmp_path, CONVEX, maps={"size": 16}, **near)).advice
+    assert any(words.startswith("one lookup a pixel follows") for words in flat)
+    fine = analyze(make_stage(tmp_path, BALL, maps={"size": 1024}, views={"size": [32, 32]})).advice
+    assert any("a single lookup would miss" in words for words in fine)
+
+
+def test_schlicks_formula_is_measured_where_a_material_has_another(tmp_path: Path) -> None:
+    def words(material: dict[str, Any]) -> list[str]:
+        advice = analyze(make_stage(tmp_path, BALL, material={"r0": None, **material})).advice
+        return [sentence for sentence in advice if "Schlick" in sentence]
+
+    gold = {"fresnel": "conductor", "metal": "gold"}
+    assert words(gold)[0].startswith("Schlick's formula does for the conductor")
+    water = {"fresnel": "dielectric", "ior": 1.1}
+    assert words(water)[0].startswith("the dielectric needs its own equations")
+    assert words({"fresnel": "schlick", "r0": 0.5}) == []
+
+
+def test_parts_share_a_map_where_they_want_the_same_of_it(tmp_path: Path) -> None:
+    def decision(surroundings: dict[str, Any]) -> Decision:
+        scene = {
+            "reflector": {"object": "teapot", "subdivisions": 6},
+            "surroundings": surroundings,
+            "views": {"count": 3, "degrees": 20.0, "height": 0.5, "size": [128, 128]},
+            "maps": {"size": 32, "distant": "infinite"},
+            "trace": {"indirect": "none"},
+        }
+        return of(analyze(prepare_stage(parse_config(scene, "scene"))), "maps.shared_distant")
+
+    grey = np.full((16, 32, 3), 0.5, np.float32)
+    _core.save_image(str(tmp_path / "grey.exr"), grey, ["R", "G", "B"])
+    # A sky at infinity is the same for all; a room at infinity is seen from elsewhere by lid and body.
+    sky = decision({"panorama": str(tmp_path / "grey.exr")})
+    assert sky.value is True
+    assert sky.measured == pytest.approx(0.0, abs=0.005)
+    room = decision({"room": "furnished"})
+    assert room.value is False
+    assert room.measured is not None
+    assert room.measured > 0.02

@@ -30,6 +30,7 @@ def test_auto_is_a_value_of_every_key_that_is_decided_before_a_bake() -> None:
     values: dict[str, bool | int | float | str] = {
         "trace.depth": 3, "trace.samples": 2, "layers.diffuse": True,
         "layers.local": False, "layers.hull_split": True, "maps.distant": "rotated box", "maps.size": 64,
+        "maps.shared_distant": True,
         "trace.noise": 0.05, "views.traced": 1, "infer.passes": 3, "infer.neighbours": 0.5, "static.views": 8,
         "reflector.parts": 4,
     }  # fmt: skip

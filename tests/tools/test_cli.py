@@ -385,7 +385,9 @@ def test_analyze_prints_exactly_what_a_bake_with_the_same_options_does(tmp_path:
     analyzed = run("analyze", scene, *options)
     assert (analyzed.returncode, analyzed.stderr) == (0, "")
     lines = analyzed.stdout.splitlines()
-    assert [line.split(" = ")[0] for line in lines] == list(DECIDED_KEYS)
+    decided = [line for line in lines if not line.startswith("# ")]
+    assert [line.split(" = ")[0] for line in decided] == list(DECIDED_KEYS)
+    assert any("a PEM" in line for line in lines if line.startswith("# "))
     assert "layers.local = false  # set in the scene" in lines
     baked = run("bake", scene, "--out", tmp_path / "pem", *options)
     assert baked.returncode == 0, baked.stderr

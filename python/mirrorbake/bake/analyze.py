@@ -12,6 +12,7 @@ from mirrorbake import _core
 from mirrorbake.bake.count_parts import parts_decision
 from mirrorbake.bake.probe import LOBE_PROBE_SAMPLES, Probe, probe_points, relative_change, relative_spread
 from mirrorbake.bake.quality import quality_decisions
+from mirrorbake.bake.worth import advice_of, shared_distant
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, hull_triangles, proxy_to_attributes
 from mirrorbake.scene.plan import Decision, Plan
@@ -73,6 +74,7 @@ def analyze(stage: Stage) -> Plan:
     on_hull = hull_triangles(stage.built.positions, stage.built.triangles)[probe.triangle]
     local = _local(stage, probe, on_hull)
     samples = _samples(stage, int(depth.value))
+    size = _map_size(stage, proxy)
     decisions = [
         parts,
         depth,
@@ -81,10 +83,12 @@ def analyze(stage: Stage) -> Plan:
         *local,
         _hull_split(stage, on_hull, any_local=any(decision.value for decision in local)),
         distant,
-        _map_size(stage, proxy),
+        size,
+        shared_distant(stage, probe, proxy),
         *quality_decisions(stage, int(samples.value)),
     ]
-    return Plan(tuple(decisions), proxy_to_attributes(proxy))
+    advice = advice_of(stage, probe, proxy, int(size.value))
+    return Plan(tuple(decisions), proxy_to_attributes(proxy), tuple(advice))
 
 
 def _depth(stage: Stage, full: Probe) -> Decision:

@@ -55,7 +55,7 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
         irradiance = np.zeros((count, len(built.positions), 3), np.float32)
         if count == 1:
             irradiance[0] = tracer.vertex_irradiance(built.reflector, DIFFUSE_RAYS, config.trace.seed)
-    shared = config.maps.shared_distant
+    shared = bool(plan.value("maps.shared_distant"))
     header = Header(
         source=source,
         plan=plan,

@@ -215,8 +215,9 @@ class Maps(Section):
     """How a box is fitted to the surroundings that the object sees: to the angles under which the map's
     origin sees them, as the other shapes are; to the walls by robust least squares; or with its bottom below
     the object and the other sides at the mean distance ([PEM] §4)."""
-    shared_distant: bool = False
-    """Whether all parts read one distant map, which saves a map for each further part ([PEM] §6)."""
+    shared_distant: Annotated[bool | None, *AUTO] = None
+    """Whether all parts read one distant map, which saves a map for each further part ([PEM] §6). "auto": if
+    they want the same of it."""
     precision: Literal["float16", "float32"] = "float16"
     """Storage of the maps on disk."""
 

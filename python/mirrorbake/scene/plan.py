@@ -20,6 +20,7 @@ DECIDED_KEYS = (
     "layers.hull_split",
     "maps.distant",
     "maps.size",
+    "maps.shared_distant",
     "trace.noise",
     "views.traced",
     "infer.passes",
@@ -65,6 +66,8 @@ class Plan:
     decisions: tuple[Decision, ...]
     distant: dict[str, Any]
     """Proxy of the distant layer, as in a PEM's attributes."""
+    advice: tuple[str, ...] = ()
+    """What was measured of choices that are the user's: whether a PEM is worth it, and what would do."""
 
     def value(self, key: str, part: str | None = None) -> bool | int | float | str:
         """Return what was decided; KeyError for what was not."""
@@ -98,8 +101,8 @@ class Plan:
         return bool(self.value("layers.local", part))
 
     def lines(self) -> list[str]:
-        """Return the decisions in words, one a line."""
-        return [str(decision) for decision in self.decisions]
+        """Return the decisions in words, one a line, and the advice as comments."""
+        return [*(str(decision) for decision in self.decisions), *(f"# {words}" for words in self.advice)]
 
     @property
     def has_hull_split(self) -> bool:
@@ -116,6 +119,7 @@ class Plan:
         return config.model_copy(
             update={
                 "reflector": resolved("reflector", "parts"),
+                "maps": resolved("maps", "shared_distant"),
                 "trace": resolved("trace", "samples", "noise", "depth"),
                 "views": resolved("views", "traced"),
                 "infer": resolved("infer", "passes", "neighbours"),
@@ -125,12 +129,14 @@ class Plan:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
-        return {"decisions": [asdict(decision) for decision in self.decisions], "distant": self.distant}
+        decisions = [asdict(decision) for decision in self.decisions]
+        return {"decisions": decisions, "distant": self.distant, "advice": list(self.advice)}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Plan:
         """Inverse of `to_dict`. Raises KeyError or TypeError for what is not one."""
-        plan = Plan(tuple(Decision(**decision) for decision in data["decisions"]), data["distant"])
+        decisions = tuple(Decision(**decision) for decision in data["decisions"])
+        plan = Plan(decisions, data["distant"], tuple(data["advice"]))
         for key in DECIDED_KEYS:
             if all(decision.key != key for decision in plan.decisions):
                 raise KeyError(key)

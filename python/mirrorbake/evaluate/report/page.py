@@ -309,7 +309,13 @@ def _plan(store: PemStore) -> str:
         value = str(decision.value).lower() if isinstance(decision.value, bool) else str(decision.value)
         reason = decision.reason if decision.part is None else f"{decision.part}: {decision.reason}"
         rows.append([_cell(decision.key), _cell(value), _cell(reason, "words")])
-    return "<h2>What was decided, and why</h2>\n" + _rows(["key", "value", "reason"], rows)
+    advice = [f'<p class="soft">{html.escape(_sentence(words))}</p>' for words in store.header.plan.advice]
+    table = _rows(["key", "value", "reason"], rows)
+    return "\n".join(["<h2>What was decided, and why</h2>", *advice, table])
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:] + "."
 
 
 def _bytes(path: Path) -> int:

@@ -123,20 +123,19 @@ def _blending(config: SceneConfig) -> Axis | None:
 
 
 def _parts(config: SceneConfig) -> Axis | None:
-    if config.reflector.scene_object is not None:
-        return None
     own = config.reflector.parts
-    settings = [Setting("as planned" if own is None else str(own))]
-    settings += [
-        Setting(str(other), {"reflector.parts": other}) for other in ("joined", "split", 4, 8) if other != own
-    ]
+    if own is None or config.reflector.scene_object is not None:
+        return None
+    others = [parts for parts in ("joined", "split", 4, 8) if parts != own]
+    settings = [Setting(_label(own)), *(Setting(_label(p), {"reflector.parts": p}) for p in others)]
     return Axis("parts", "parts with maps of their own", tuple(settings))
 
 
 def _shared(config: SceneConfig) -> Axis | None:
-    if config.reflector.object is None or config.reflector.parts != "split":
+    parts = config.reflector.parts
+    if parts in (None, "joined", 1) or (parts == "split" and config.reflector.object is None):
         return None
-    own = config.maps.shared_distant
+    own = bool(config.maps.shared_distant)
     settings = (Setting(_label(own)), Setting(_label(not own), {"maps.shared_distant": not own}))
     return Axis("shared", "one distant map for all parts", settings)
 

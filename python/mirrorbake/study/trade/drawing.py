@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
-from mirrorbake import _core, fresnel
+from mirrorbake import _core
 from mirrorbake.evaluate.contenders import away_of, nearest_sample
+from mirrorbake.scene.reflectance import is_plain, materials_of, reflectance
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.evaluate.contenders import Frame
@@ -29,8 +29,6 @@ FILTERS: dict[str, tuple[Any, int]] = {
     "1 to 16 taps": ("anisotropic", 16),
 }
 """Filter and taps of a run time, by the label of a setting."""
-TABLE_ERROR = 1e-3
-"""Of tables of Fresnel reflectance, which are as long as that needs."""
 
 
 @dataclass(frozen=True)
@@ -81,9 +79,9 @@ def label_of(model: _core.RunTimeModel) -> str:
 
 def fresnel_models(stage: Stage) -> list[FresnelModel]:
     """The ways to evaluate a reflector's reflectance, `traced` first; that alone where textures change it."""
-    if any(m.specular_texture.texture >= 0 or m.colors_tint_reflectance for m in _materials(stage)):
+    if not is_plain(stage):
         return ["traced"]
-    models = {material.fresnel.model for material in _materials(stage)}
+    models = {material.fresnel.model for material in materials_of(stage)}
     if models <= {"constant"}:
         return ["traced"]
     exact: list[FresnelModel] = [] if models <= {"constant", "schlick"} else ["exact"]
@@ -131,10 +129,10 @@ def draw_samples(
             incident += through * layer[:, :3]
             through *= 1.0 - layer[:, 3:]
         here = number_of_sample == number
-        reflectance = np.asarray(samples.fresnel)
+        share = np.asarray(samples.fresnel)
         if cosine is not None:
-            reflectance = cosine.reflectance(_materials(stage)[number].fresnel, drawing.fresnel)
-        light[here] = (reflectance * incident)[here]
+            share = cosine.reflectance(materials_of(stage)[number].fresnel, drawing.fresnel)
+        light[here] = (share * incident)[here]
     diffuse = pem.run_time.diffuse_at(samples, point)
     if diffuse is not None:
         light += diffuse
@@ -185,9 +183,10 @@ class _Cosine:
 
     def reflectance(self, material: _core.Fresnel, how: FresnelModel) -> FloatArray:
         """F (n, 3) of every sample."""
+        assert how != "traced"
         if how != "Schlick at vertices":
-            return _of_channels(material, how, self._pixel)
-        corners = _of_channels(material, "Schlick", self._vertex)[
+            return reflectance(material, how, self._pixel)
+        corners = reflectance(material, "Schlick", self._vertex)[
             self._triangles[np.asarray(self._samples.triangle)]
         ]
         second = np.asarray(self._samples.barycentric)
@@ -195,43 +194,3 @@ class _Cosine:
         weights = np.concatenate([first, second], axis=1)
         found: FloatArray = np.einsum("nk,nkc->nc", weights, corners).astype(np.float32)
         return found
-
-
-def _of_channels(material: _core.Fresnel, how: FresnelModel, cosines: FloatArray) -> FloatArray:
-    c = np.ascontiguousarray(cosines, np.float32)
-    channels = []
-    for channel in range(3):
-        if material.model == "constant":
-            channels.append(np.full_like(c, material.r0[channel]))
-        else:
-            channels.append(np.asarray(_function(*_curve(material, channel), how)(c), np.float32))
-    return np.stack(channels, axis=-1)
-
-
-def _curve(material: _core.Fresnel, channel: int) -> tuple[str, float, float]:
-    if material.model == "schlick":
-        return "schlick", material.r0[channel], 0.0
-    return (
-        material.model,
-        material.eta[channel],
-        material.k[channel] if material.model == "conductor" else 0.0,
-    )
-
-
-@lru_cache(maxsize=64)
-def _function(model: str, first: float, second: float, how: FresnelModel) -> Callable[[Any], Any]:
-    curve: fresnel.Model
-    if model == "schlick":
-        curve = fresnel.Schlick(first)
-    elif model == "dielectric":
-        curve = fresnel.Dielectric(first)
-    else:
-        curve = fresnel.Conductor(first, second)
-    if how == "table":
-        return fresnel.table_for_error(curve, TABLE_ERROR)
-    return fresnel.Schlick(float(curve(1.0))) if how == "Schlick" else curve
-
-
-def _materials(stage: Stage) -> list[_core.Material]:
-    scene = stage.built.scene
-    return [scene.material(index) for index in scene.object_part_materials(stage.built.reflector)]

@@ -7,7 +7,7 @@ import itertools
 import json
 import time
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mirrorbake.bake.bake import ProgressReport
-    from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.config import Parts, SceneConfig
     from mirrorbake.scene.stage import Stage
 
 STUDY_NAME = "study.json"
@@ -181,7 +181,8 @@ def _words(settings: Mapping[str, Setting]) -> str:
 
 
 _DECIDED = (
-    *("trace.depth", "trace.samples", "trace.noise", "maps.size", "maps.distant"),
+    *("reflector.parts", "trace.depth", "trace.samples", "trace.noise", "maps.size", "maps.distant"),
+    "maps.shared_distant",
     *("views.traced", "infer.passes", "infer.neighbours"),
 )
 """What all trials share of the plan; with them the local layer, if all parts have one or none has."""
@@ -215,6 +216,7 @@ def _studied(config: SceneConfig) -> Stage:
     local = {decision.value for decision in plan.decisions if decision.key == "layers.local"}
     if len(local) == 1:
         decided["layers.local"] = local.pop()
+    stage = stage.in_parts(cast("Parts", plan.value("reflector.parts")))
     return replace(stage, config=overridden(config, decided))
 
 

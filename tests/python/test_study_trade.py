@@ -309,6 +309,19 @@ def test_a_study_that_is_repeated_measures_nothing_again(
     assert again.all == result.all
 
 
+def test_a_run_time_of_one_lookup_is_baked_from_targets_of_little_noise(tmp_path: Path) -> None:
+    scene = {
+        **SCENE,
+        "infer": {"run_time": "Web1"},
+        "trace": {"samples": 4, "noise": 0.05, "most_samples": 16, "depth": 1, "indirect": "none"},
+        "views": {**SCENE["views"], "count": 1, "degrees": 0.0},
+    }
+    bake(parse_config(scene, "scene"), tmp_path / "pem")
+    pem = open_pem(tmp_path / "pem")
+    assert len(pem.run_time.places) == 1
+    assert picture(pem).max() > 0.1
+
+
 def test_a_study_keeps_to_its_time_and_goes_on(tmp_path: Path) -> None:
     config = parse_config(SCENE, "scene")
     short = study(config, tmp_path, ["blending"], minutes=0.0)

@@ -341,6 +341,8 @@ SurfaceSamples Tracer::trace_visibility(const Camera& camera, int reflector,
   const World& world = state_->lit.world;
   validate(camera);
   TraceOptions options = trace_options;
+  // Where the samples lie has no noise that could decide on their number.
+  options.noise = 0.0F;
   if (!places.empty()) {
     check_places(places);
     options.samples_per_pixel = static_cast<int>(places.size());

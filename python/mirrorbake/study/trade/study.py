@@ -145,7 +145,7 @@ def study(
         start = time.monotonic()
         try:
             trial = bench.measure(settings)
-        except InputError as failure:
+        except (InputError, _core.InvalidArgument, _core.NumericalError) as failure:
             notebook.refuse(settings, str(failure))
             return None
         costs.append(time.monotonic() - start)

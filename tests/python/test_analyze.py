@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from mirrorbake.bake.analyze import (
 )
 from mirrorbake.bake.bake import bake
 from mirrorbake.bake.count_parts import disagreement
-from mirrorbake.bake.probe import Probe
+from mirrorbake.bake.probe import Probe, displayed_noise
 from mirrorbake.errors import InputError
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.scene.load import parse_config
@@ -164,7 +165,9 @@ def shiny_ball(folder: Path, roughness: float) -> Stage:
 def test_only_a_rough_reflector_gets_samples_for_its_lobe_and_only_it_gets_small_maps(tmp_path: Path) -> None:
     mirror = analyze(shiny_ball(tmp_path, 0.0))
     assert mirror.samples == MIRROR_SAMPLES
-    assert of(mirror, "trace.samples").measured is None
+    noise = of(mirror, "trace.samples").measured
+    assert noise is not None
+    assert 0.0 < noise < 0.05
     # Perceptual roughness: α is its square.
     rough = analyze(shiny_ball(tmp_path, 0.7))
     assert MIRROR_SAMPLES < rough.samples <= MOST_SAMPLES
@@ -285,6 +288,31 @@ def test_a_planned_stage_has_the_parts_that_were_decided(tmp_path: Path) -> None
     assert len(other.built.part_names) == 3
     assert stage.in_parts(3) is other
     np.testing.assert_array_equal(other.built.triangles, stage.built.triangles)
+
+
+def test_the_noise_of_displayed_pixels_is_that_of_their_samples() -> None:
+    samples, pixels, deviation = 16, 20_000, 0.02
+    random = np.random.default_rng(3)
+    probe = SimpleNamespace(
+        pixel=np.repeat(np.arange(pixels), samples),
+        beauty=random.normal(0.5, deviation, (samples * pixels, 3)),
+    )
+    # The derivative of the sRGB curve at 0.5, and four times less noise in a mean of 16. Of 20,000 pixels the
+    # estimate is good to half a per cent.
+    expected = 1.055 / 2.4 * 0.5 ** (1.0 / 2.4 - 1.0) * deviation / 4.0
+    assert displayed_noise(cast("Probe", probe)) == pytest.approx(expected, rel=0.02)
+
+
+def test_a_mirror_whose_noise_nothing_mends_gets_more_samples(tmp_path: Path) -> None:
+    def samples(noise: float, limit: float) -> Decision:
+        trace = {"noise": noise, "samples": "auto"}
+        return of(analyze(make_stage(tmp_path, RING, trace=trace, auto={"noise": limit})), "trace.samples")
+
+    measured = samples(0.0, 0.9).measured
+    assert samples(0.0, 0.9).value == MIRROR_SAMPLES
+    assert measured is not None
+    assert samples(0.0, measured / 1.9).value == 4 * MIRROR_SAMPLES
+    assert samples(0.01, measured / 1.9).value == MIRROR_SAMPLES
 
 
 # What a scene would do without

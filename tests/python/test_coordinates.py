@@ -94,7 +94,6 @@ def scene(folder: Path, at: tuple[float, float, float], height: float, reflector
         what = {
             "object": "teapot",
             "subdivisions": 6,
-            "parts": "split",
             "height": height,
             "position": list(at),
             "parts": "joined",

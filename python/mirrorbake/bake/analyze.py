@@ -10,8 +10,15 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.bake.count_parts import parts_decision
-from mirrorbake.bake.probe import LOBE_PROBE_SAMPLES, Probe, probe_points, relative_change, relative_spread
-from mirrorbake.bake.quality import quality_decisions
+from mirrorbake.bake.probe import (
+    LOBE_PROBE_SAMPLES,
+    Probe,
+    displayed_noise,
+    probe_points,
+    relative_change,
+    relative_spread,
+)
+from mirrorbake.bake.quality import QUALITIES, quality_decisions
 from mirrorbake.bake.worth import advice_of, shared_distant
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, hull_triangles, proxy_to_attributes
@@ -124,8 +131,7 @@ def _samples(stage: Stage, depth: int) -> Decision:
         return Decision("trace.samples", None, config.trace.samples, False, _SET, None)
     lobes = {material.lobe for material in _materials(stage) if material.specular}
     if lobes <= {"mirror"}:
-        reason = "a mirror needs one direction per sample, so that samples only smooth edges"
-        return Decision("trace.samples", None, MIRROR_SAMPLES, True, reason, None)
+        return _mirror_samples(stage, depth)
     probe = Probe.of(stage, depth, LOBE_PROBE_SAMPLES)
     spread = relative_spread(probe.incident, probe.pixel)
     wanted = max((spread / config.auto.noise) ** 2, 1.0)
@@ -136,6 +142,21 @@ def _samples(stage: Stage, depth: int) -> Decision:
         f"{names} lobe; {samples} leave a noise of {spread / math.sqrt(samples):.1%}"
     )
     return Decision("trace.samples", None, samples, True, reason, spread)
+
+
+def _mirror_samples(stage: Stage, depth: int) -> Decision:
+    config = stage.config
+    noise = displayed_noise(Probe.of(stage, depth, MIRROR_SAMPLES))
+    reason = f"{MIRROR_SAMPLES} leave a noise of {noise:.3f} of the display's range"
+    wanted = QUALITIES[config.auto.quality].noise if config.trace.noise is None else config.trace.noise
+    samples = MIRROR_SAMPLES
+    if wanted > 0.0 and config.infer.fit == "display":
+        reason += "; noisy pixels get more, by trace.noise"
+    elif noise > config.auto.noise:
+        samples *= 2 ** math.ceil(math.log2((noise / config.auto.noise) ** 2))
+        samples = min(samples, MOST_SAMPLES)
+        reason += f", {samples} of {noise * math.sqrt(MIRROR_SAMPLES / samples):.3f}"
+    return Decision("trace.samples", None, samples, True, reason, noise)
 
 
 def _diffuse(stage: Stage, probe: Probe) -> Decision:

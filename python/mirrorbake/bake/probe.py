@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.tone import srgb_encoded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -134,3 +135,25 @@ def relative_spread(values: DoubleArray, pixel: NDArray[np.int64]) -> float:
     variance = np.bincount(place, weights=squares) / (3.0 * (count - 1))
     scale = float(np.sqrt(np.mean(means * means)))
     return float(np.sqrt(np.mean(variance))) / scale if scale > 0.0 else 0.0
+
+
+def displayed_noise(probe: Probe) -> float:
+    """Root mean square error, of the display's range, that the samples of a pixel leave in it.
+
+    From the difference of two halves of them; pixels with fewer than two samples on the object say nothing.
+    """
+    _, first, place, count = np.unique(
+        probe.pixel, return_index=True, return_inverse=True, return_counts=True
+    )
+    place = place.reshape(-1)
+    second = (np.arange(len(place)) - first[place]) % 2 == 1
+    shown = []
+    for half in (second, ~second):
+        held = np.bincount(place[half], minlength=len(count))
+        sums = [np.bincount(place[half], probe.beauty[half, c], len(count)) for c in range(3)]
+        means = np.stack(sums, axis=-1) / np.maximum(held, 1)[:, None]
+        shown.append(srgb_encoded(means.astype(np.float32)))
+    several = count > 1
+    if not several.any():
+        return 0.0
+    return float(np.sqrt(np.mean(((shown[0] - shown[1])[several] / 2.0) ** 2)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -228,6 +229,10 @@ if __name__ == "__main__":
         # Workers die with the process that started them, or at least with their connection to it.
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+        if PemStore.exists(tmp_path / "killed") and PemStore.open(tmp_path / "killed").completed().all():
+            # What is done cannot be killed any more: the next moments are those of another bake.
+            assert objects(tmp_path / "killed") == whole
+            shutil.rmtree(tmp_path / "killed")
     bake(config, tmp_path / "killed")
     assert objects(tmp_path / "killed") == whole
     assert verify(tmp_path / "killed").is_sound

@@ -114,7 +114,7 @@ def bake(
         if PemStore.exists(location):
             store = PemStore.open(location, writable=True)
             if samples is None:
-                store.remove_stray_files()
+                store.location.remove_stray_files()
             contents = store.contents()
         else:
             report(0, total, "finding out what the scene requires")

@@ -49,8 +49,8 @@ class Layout:
     shape: tuple[int, ...]
     chunk: tuple[int, ...]
     """What is compressed and checked as one."""
-    shard: tuple[int, ...]
-    """What is one object."""
+    shard: tuple[int, ...] | None
+    """What is one object; None: every chunk is."""
     dtype: str
     dimensions: tuple[str, ...]
 
@@ -94,6 +94,42 @@ def sample_layouts(header: Header) -> dict[str, Layout]:
         ),
         "record": Layout((samples, columns), (1, columns), (1, columns), "float64", ("sample", "column")),
     }
+
+
+MOST_OF_A_MESH = 1 << 28
+"""Vertices or triangles that a reflector may have."""
+
+
+def shared_layout(name: str, counted: int, header: Header) -> Layout:
+    """Return the layout of an array that all samples share.
+
+    Parameters
+    ----------
+    name
+        Of the array.
+    counted
+        Vertices or triangles of the reflector, whichever it has a row for.
+    header
+        Of the PEM.
+    """
+    size, texels = header.map_size, header.topology.texels
+    if name == "static/capture":
+        shape: tuple[int, ...] = (header.faces, size, size, 3)
+        return Layout(shape, shape, None, "float32", ("face", "row", "column", "channel"))
+    if name == "static/maps":
+        shape = (len(header.maps), texels, 4)
+        return Layout(shape, (1, texels, 4), None, header.precision, ("map", "texel", "channel"))
+    if name == "local_triangles":
+        return Layout((counted,), (counted,), None, "uint8", ("triangle",))
+    samples = len(header.space) if header.space.changes_scene else 1
+    return Layout((samples, counted, 3), (1, counted, 3), None, "float32", ("sample", "vertex", "channel"))
+
+
+def counted_in(name: str, shape: tuple[int, ...]) -> int:
+    """Return how many vertices or triangles an array of this shape is for; 0 if none can be."""
+    place = {"local_triangles": 0, "diffuse/irradiance": 1}.get(name)
+    count = shape[place] if place is not None and place < len(shape) else 0
+    return count if 0 < count <= MOST_OF_A_MESH else 0
 
 
 def codecs_of(dtype: str) -> tuple[BloscCodec, Crc32cCodec]:

@@ -84,6 +84,12 @@ class Location:
             return (self.path / GROUP_NAME).is_dir()
         return has_key(self.store(writable=False), "zarr.json")
 
+    def remove_stray_files(self) -> None:
+        """Remove what a killed write left behind in a folder."""
+        if not self.is_remote:
+            for stray in (self.path / GROUP_NAME).rglob("*.partial"):
+                stray.unlink(missing_ok=True)
+
     @property
     def partial_name(self) -> str:
         """A name for the group while it is made, which no other process uses."""

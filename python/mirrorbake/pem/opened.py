@@ -56,6 +56,7 @@ def open_pem(directory: Location | Path | str, stage: Stage | None = None) -> Op
     store.require_complete()
     config = unchanged_config(store)
     stage = (stage or prepare_stage(config)).planned(store.header.plan)
+    store.check_mesh(len(stage.built.positions), len(stage.built.triangles))
     return OpenedPem(store, stage, RunTime(store, stage.built.triangles))
 
 

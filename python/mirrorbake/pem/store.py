@@ -38,9 +38,11 @@ from mirrorbake.pem.layout import (
     Contents,
     SolverReport,
     Timings,
+    counted_in,
     fill_group,
     read_back,
     sample_layouts,
+    shared_layout,
     stored_images,
     stored_map,
 )
@@ -170,34 +172,40 @@ class PemStore:
             raise StoreError(f"{where}: damaged: {name}: {failure}") from None
         if not isinstance(array, zarr.Array):
             raise StoreError(f"{where}: damaged: {name} is not an array")
-        layout = sample_layouts(self.header).get(name)
-        if layout is not None:
-            found = (array.shape, array.chunks, array.shards, str(array.dtype))
-            expected = (layout.shape, layout.chunk, layout.shard, layout.dtype)
-            if found != expected:
-                raise StoreError(f"{where}: damaged: {name} has the layout {found}, expected {expected}")
-        elif array.size > _MOST_VALUES or array.dtype.kind not in "fu":
-            raise StoreError(f"{where}: damaged: {name} has the shape {array.shape}")
+        layout = sample_layouts(self.header).get(name) or shared_layout(
+            name, counted_in(name, array.shape), self.header
+        )
+        found = (array.shape, array.chunks, array.shards, str(array.dtype))
+        expected = (layout.shape, layout.chunk, layout.shard, layout.dtype)
+        if found != expected:
+            raise StoreError(f"{where}: damaged: {name} has the layout {found}, expected {expected}")
         # Black is written like any other colour: a chunk that is not there is damage.
         return array.with_config({"write_empty_chunks": True})
 
+    def _has(self, name: str) -> bool:
+        """Whether there is an array that not every PEM has, or should be by what the header says."""
+        header = self.header
+        expected = {
+            "static/maps": header.static["fade"] is not None,
+            "local_triangles": any(s.polygons == "off hull" for part in header.parts for s in part.shells),
+            "diffuse/irradiance": bool(header.plan.value("layers.diffuse")),
+        }
+        return expected.get(name, False) or has_key(self._group.store, f"{name}/zarr.json")
+
     def _read(self, name: str, index: Any = ...) -> NDArray[Any]:
-        # zarr reports a chunk that does not decode as whatever its codec raised: RuntimeError, ValueError,
-        # OSError, zlib.error.
+        # zarr reports a chunk that does not decode as whatever its codec raised.
         array = self._array(name)
         where = f"{self.location}/{GROUP_NAME}"
+        sample = index[0] if isinstance(index, tuple) else index
+        at = name if sample is ... else f"sample {sample} of {name}"
+        objects = range(array.shape[0] // array.chunks[0]) if sample is ... else (sample,)
         try:
-            if isinstance(index, int) and not has_key(self._group.store, _key(array, name, index)):
-                raise StoreError(f"{where}: damaged: sample {index} of {name} is missing")
-            if index is ... and not has_key(self._group.store, _key(array, name, 0)):
-                raise StoreError(f"{where}: damaged: {name} is missing")
+            if not all(has_key(self._group.store, _key(array, name, i)) for i in objects):
+                raise StoreError(f"{where}: damaged: {at} is missing")
             return np.asarray(array[index])
-        except StoreError:
-            raise
-        except MemoryError:
+        except (StoreError, MemoryError):
             raise
         except Exception as failure:
-            at = f"sample {index} of {name}" if isinstance(index, int) else name
             raise StoreError(f"{where}: damaged: {at} cannot be read: {failure}") from None
 
     def completed(self) -> NDArray[np.bool_]:
@@ -296,9 +304,6 @@ class PemStore:
     def read_map(self, part: str, layer: str, index: int) -> FloatArray:
         """Pyramid of the map of a part's shell in one sample, shape (texels, C), float32."""
         number = self.header.map_of(part, layer)
-        array = self._array("maps")
-        if not has_key(self._group.store, _key(array, "maps", index)):
-            raise StoreError(f"{self.location}/{GROUP_NAME}: damaged: sample {index} of maps is missing")
         channels = self.header.maps[number].channels
         return read_back(self._read("maps", (index, number))[:, :channels], self.header)
 
@@ -334,16 +339,13 @@ class PemStore:
 
     def read_static_maps(self) -> FloatArray | None:
         """The static set: pyramids (M, texels, 4) of all maps; None if there is none."""
-        if "static/maps" not in self._group:
+        if not self._has("static/maps"):
             return None
-        stored = self._read("static/maps")
-        if stored.shape != (len(self.header.maps), self.header.topology.texels, 4):
-            raise StoreError(f"{self.location}: damaged: static/maps has the shape {stored.shape}")
-        return np.stack([read_back(pyramid, self.header) for pyramid in stored])
+        return np.stack([read_back(pyramid, self.header) for pyramid in self._read("static/maps")])
 
     def read_irradiance(self, index: int = 0) -> FloatArray | None:
         """Irradiance at the object's vertices in one sample, shape (V, 3); None without a diffuse layer."""
-        if "diffuse/irradiance" not in self._group:
+        if not self._has("diffuse/irradiance"):
             return None
         return self._read("diffuse/irradiance", index if self.has_irradiance_per_sample else 0).astype(
             np.float32
@@ -356,23 +358,31 @@ class PemStore:
 
     def read_local_triangles(self) -> NDArray[np.uint8] | None:
         """Shape (T,): 0 for triangles that shells for `off hull` leave out; None if there are none."""
-        if "local_triangles" not in self._group:
+        if not self._has("local_triangles"):
             return None
         return self._read("local_triangles").astype(np.uint8)
 
     def sample_bytes(self, index: int) -> int:
         """Bytes that a sample takes."""
         names = [*_SAMPLE_ARRAYS]
-        if "diffuse/irradiance" in self._group and self.has_irradiance_per_sample:
+        if self._has("diffuse/irradiance") and self.has_irradiance_per_sample:
             names.append("diffuse/irradiance")
         return sum(stored_bytes(self._group.store, _key(self._array(name), name, index)) for name in names)
+
+    def check_mesh(self, vertices: int, triangles: int) -> None:
+        """Raise StoreError unless what is stored of the mesh is for so many vertices and triangles."""
+        for name, count in (("diffuse/irradiance", vertices), ("local_triangles", triangles)):
+            stored = counted_in(name, self._array(name).shape) if self._has(name) else count
+            if stored != count:
+                where = f"{self.location}/{GROUP_NAME}"
+                raise StoreError(f"{where}: damaged: {name} is for {stored} of a mesh, expected {count}")
 
     def array_names(self) -> list[str]:
         """Names of the arrays that are not of single samples."""
         names = ["static/capture", "static/maps", "local_triangles"]
         if not self.has_irradiance_per_sample:
             names.append("diffuse/irradiance")
-        return [name for name in names if name in self._group]
+        return [name for name in names if self._has(name)]
 
     def check_array(self, name: str) -> None:
         """Read a whole array; StoreError where it is damaged."""
@@ -382,18 +392,8 @@ class PemStore:
         """Read all of a sample; StoreError where it is damaged."""
         for name in _SAMPLE_ARRAYS:
             self._read(name, index)
-        if "diffuse/irradiance" in self._group and self.has_irradiance_per_sample:
+        if self._has("diffuse/irradiance") and self.has_irradiance_per_sample:
             self._read("diffuse/irradiance", index)
-
-    def remove_stray_files(self) -> None:
-        """Remove what a killed write left behind in a folder."""
-        if self.location.is_remote:
-            return
-        for stray in (self.directory / GROUP_NAME).rglob("*.partial"):
-            stray.unlink(missing_ok=True)
-
-
-_MOST_VALUES = 1 << 31
 
 
 def _key(array: zarr.Array[Any], name: str, index: int) -> str:

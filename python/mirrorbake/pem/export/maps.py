@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -100,6 +101,7 @@ def export_maps(
     clamped = 0
     for maps in sets:
         parts = []
+        stems: set[str] = set()
         written: dict[int, dict[str, Any]] = {}
         for part, shells in maps.parts.items():
             entries = []
@@ -109,8 +111,11 @@ def export_maps(
                     stem = (
                         maps.name
                         if shell.name == maps.name and everywhere
-                        else f"{maps.name}.{part}.{shell.name}"
+                        else f"{maps.name}.{_safe(part)}.{_safe(shell.name)}"
                     )
+                    if stem in stems:
+                        stem = f"{stem}.{len(stems)}"
+                    stems.add(stem)
                     files, count = _write_shell(shell, folder, stem, frame, format, precision)
                     clamped += count
                     written[id(shell)] = _describe(shell, frame, files, format)
@@ -125,6 +130,11 @@ def export_maps(
             f"{clamped} values beyond ±65504 were clamped to what half floats hold; use float32 to keep them"
         )
     return description
+
+
+def _safe(name: str) -> str:
+    """A name as a part of a file's name: names of objects may hold anything."""
+    return re.sub(r"[^\w-]+", "_", name, flags=re.ASCII)[:60]
 
 
 def _frame(convention: str, format: str, precision: str) -> Frame:

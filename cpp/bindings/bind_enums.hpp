@@ -15,6 +15,7 @@
 #include "mirrorbake/envmap/sampling.hpp"
 #include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/image/texture_file.hpp"
+#include "mirrorbake/prefilter/background.hpp"
 #include "mirrorbake/prefilter/convolve.hpp"
 #include "mirrorbake/prefilter/harmonics.hpp"
 #include "mirrorbake/prefilter/lobe.hpp"
@@ -113,6 +114,7 @@ MIRRORBAKE_NAME_ENUM(HarmonicWindow, "window", "none", "hanning", "sloan");
 MIRRORBAKE_NAME_ENUM(Illuminant, "illuminant", "D65", "E");
 MIRRORBAKE_NAME_ENUM(IndirectLight, "indirect", "none", "cached", "path");
 MIRRORBAKE_NAME_ENUM(LayerModel, "layers", "additive", "coated");
+MIRRORBAKE_NAME_ENUM(Lens, "lens", "perspective", "fisheye");
 MIRRORBAKE_NAME_ENUM(LobeKind, "kind", "lambert", "phong", "ggx", "table");
 MIRRORBAKE_NAME_ENUM(LobeScale, "scale", "mean", "sum");
 MIRRORBAKE_NAME_ENUM(LookupFilter, "filter", "nearest", "bilinear", "trilinear", "anisotropic");

@@ -7,9 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include <glm/gtc/type_ptr.hpp>
+#include <glm/matrix.hpp>
+
 #include "bind.hpp"
 #include "bind_enums.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
+#include "mirrorbake/prefilter/background.hpp"
 #include "mirrorbake/prefilter/convolve.hpp"
 #include "mirrorbake/prefilter/harmonics.hpp"
 #include "mirrorbake/prefilter/lobe.hpp"
@@ -39,6 +43,11 @@ Lobe lobe_of(LobeKind kind, double parameter, std::vector<double> table) {
 }
 
 using DoubleMatrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+using DirectionImage = nb::ndarray<const double, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+using Rotation = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
+
+glm::dmat3 matrix_of(const Rotation& rows) { return glm::transpose(glm::make_mat3(rows.data())); }
 
 // Coefficients (n, channels), n a square.
 Harmonics harmonics_of(const DoubleMatrix& coefficients) {
@@ -224,6 +233,41 @@ void bind_prefilter(nb::module_& m) {
         return to_numpy(std::move(table), {n, n, 3});
       },
       nb::arg("size"), nb::arg("roughness"), "Scale, bias and their sum (roughness, n.v, 3).");
+
+  m.def(
+      "lens_directions",
+      [](Lens lens, int width, int height, double field_of_view) {
+        const std::vector<glm::dvec3> directions = lens_directions(lens, width, height, field_of_view);
+        std::vector<double> values;
+        for (const glm::dvec3& d : directions) values.insert(values.end(), {d.x, d.y, d.z});
+        return to_numpy(std::move(values),
+                        {static_cast<std::size_t>(height), static_cast<std::size_t>(width), 3});
+      },
+      nb::arg("lens"), nb::arg("width"), nb::arg("height"), nb::arg("field_of_view"),
+      "Directions (height, width, 3) of the pixels of a camera; NaN beyond the disc of a fisheye.");
+  m.def(
+      "background",
+      [](const EnvMapLayout& layout, FloatArray values, const DirectionImage& directions,
+         const Rotation& world_from_camera, const Rotation& world_from_camera_end, int steps) {
+        const std::size_t height = directions.shape(0);
+        const std::size_t width = directions.shape(1);
+        std::vector<glm::dvec3> d(height * width);
+        for (std::size_t i = 0; i < d.size(); ++i) {
+          d[i] = {directions.data()[3 * i], directions.data()[3 * i + 1], directions.data()[3 * i + 2]};
+        }
+        const BackgroundOptions options{matrix_of(world_from_camera), matrix_of(world_from_camera_end),
+                                        steps};
+        std::vector<float> picture;
+        {
+          nb::gil_scoped_release released;
+          picture = background({layout, {values.data(), values.size()}}, d, static_cast<int>(width),
+                               static_cast<int>(height), options);
+        }
+        return to_numpy(std::move(picture), {height, width, static_cast<std::size_t>(layout.channels)});
+      },
+      nb::arg("layout"), nb::arg("values"), nb::arg("directions"), nb::arg("world_from_camera"),
+      nb::arg("world_from_camera_end"), nb::arg("steps"),
+      "Picture (height, width, channels) of what a camera that turns sees.");
 }
 
 }  // namespace mirrorbake::bindings

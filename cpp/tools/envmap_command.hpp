@@ -109,5 +109,6 @@ std::unique_ptr<Command> add_sample(CLI::App& app);
 std::unique_ptr<Command> add_compare(CLI::App& app);
 std::unique_ptr<Command> add_prefilter(CLI::App& app);
 std::unique_ptr<Command> add_preview(CLI::App& app);
+std::unique_ptr<Command> add_background(CLI::App& app);
 
 }  // namespace mirrorbake::tool

@@ -2010,6 +2010,14 @@ def split_sum(cosine: float, alpha: float) -> tuple[float, float]:
 def split_sum_table(size: int, roughness: Literal['squared', 'linear']) -> NDArray[numpy.float32]:
     """Scale, bias and their sum (roughness, n.v, 3)."""
 
+def lens_directions(lens: Literal['perspective', 'fisheye'], width: int, height: int, field_of_view: float) -> NDArray[numpy.float64]:
+    """
+    Directions (height, width, 3) of the pixels of a camera; NaN beyond the disc of a fisheye.
+    """
+
+def background(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float64], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], world_from_camera: Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='C', device='cpu', writable=False)], world_from_camera_end: Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='C', device='cpu', writable=False)], steps: int) -> NDArray[numpy.float32]:
+    """Picture (height, width, channels) of what a camera that turns sees."""
+
 @overload
 def fresnel_schlick(c: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], r0: float, f: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu')]) -> None: ...
 

@@ -19,6 +19,7 @@ COMMANDS = [
             "convert",
             "rotate",
             "preview",
+            "background",
             "mips",
             "border",
             "sample",

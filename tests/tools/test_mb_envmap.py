@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mirrorbake import load_image
 from mirrorbake.envmap import EnvMap
+from mirrorbake.prefilter.backgrounds import background, fisheye, perspective, rotation
 from mirrorbake.projection import texel_directions
 from mirrorbake.tone import displayed
 from programs import find_program, needs_program, run_program
@@ -339,8 +341,56 @@ def test_a_fisheye_photograph_of_the_sky_is_brought_to_its_place(tmp_path: Path)
     EnvMap.from_array(photograph, "fisheye:180").save(tmp_path / "sky.exr", format="float32")
     upwards = ("--from", "fisheye:180", "--to", "latlong", "--axis", 1, 0, 0, "--turn", -90)
     mb_envmap("convert", tmp_path / "sky.exr", *upwards, "-o", tmp_path / "out.exr")
-    seen = EnvMap.load(tmp_path / "out.exr").sample([[0, 1, 0], [0, 0.2, 1], [0, 0.2, -1], [0, -1, 0]])
+    seen = EnvMap.load(tmp_path / "out.exr").sample(
+        np.array([[0, 1, 0], [0, 0.2, 1], [0, 0.2, -1], [0, -1, 0]])
+    )
     np.testing.assert_allclose(seen, [[9, 0, 0], [0, 9, 0], [1, 1, 1], [0, 0, 0]], atol=1e-5)
+
+
+def test_backgrounds_are_those_of_the_library(tmp_path: Path) -> None:
+    d = texel_directions("latlong", 128, 64)
+    source = EnvMap.from_array((2 + np.sin(5 * d)).astype(np.float32), "latlong")
+    source.save(tmp_path / "in.exr", format="float32")
+    out = tmp_path / "out.exr"
+    picture = ("background", tmp_path / "in.exr", "--format", "float32", "-o", out)
+
+    def made(*arguments: object) -> np.ndarray:
+        mb_envmap(*picture, *arguments)
+        return load_image(str(out))[0]
+
+    still = background(source, perspective(24, 16, 45))
+    np.testing.assert_allclose(made("--size", "24x16"), still, atol=1e-6)
+    east = rotation([0, 1, 0], -90)
+    dome = background(source, fisheye(20), east)
+    np.testing.assert_allclose(made("--lens", "fisheye", "--size", 20, "--look", 1, 0, 0), dome, atol=1e-5)
+    rolled = background(source, perspective(24, 16, 60), None, rotation([0, 0, 1], 30), steps=4)
+    arguments = ("--size", "24x16", "--fov", 60, "--end-roll", 30, "--steps", 4)
+    np.testing.assert_allclose(made(*arguments), rolled, atol=1e-5)
+    panned = background(source, perspective(24, 16, 60), None, east)
+    arguments = ("--size", "24x16", "--fov", 60, "--end-look", 1, 0, 0)
+    np.testing.assert_allclose(made(*arguments), panned, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--look", 0, 0, 0), "--look"),
+        (("--look", "nan", 0, 0), "--look"),
+        (("--end-look", 0, 0, 1), "half a turn"),
+        (("--fov", 180), "field_of_view"),
+        (("--roll", "inf"), "--roll"),
+        (("--steps", 0, "--end-roll", 5), "steps"),
+        (("--lens", "perspective", "--fov", -3), "field_of_view"),
+        (("--lens", "fisheye", "--fov", 361), "field_of_view"),
+    ],
+)
+def test_cameras_that_there_are_not_are_refused(
+    panorama: Path, tmp_path: Path, arguments: tuple[object, ...], expected: str
+) -> None:
+    out = tmp_path / "out.exr"
+    message = mb_envmap("background", panorama, "--size", "8x8", *arguments, "-o", out, status=2)
+    assert expected in message
+    assert not out.exists()
 
 
 def test_preview_is_tone_mapped_as_everywhere(tmp_path: Path) -> None:

@@ -38,27 +38,12 @@ def rotation(axis: ArrayLike, degrees: float) -> NDArray[np.float64]:
 
 def perspective(width: int, height: int, field_of_view: float) -> NDArray[np.float64]:
     """Directions (height, width, 3) of a camera; ``field_of_view`` is that of the height, in degrees."""
-    if not 0 < field_of_view < 180:
-        raise _core.InvalidArgument(f"field_of_view is {field_of_view}, expected between 0 and 180 degrees")
-    scale = np.tan(np.radians(field_of_view) / 2)
-    x = ((np.arange(width) + 0.5) / width * 2 - 1) * scale * width / height
-    y = (1 - (np.arange(height) + 0.5) / height * 2) * scale
-    plane = np.broadcast_to(-1.0, (height, width))
-    return np.stack([*np.meshgrid(x, y), plane], axis=-1)
+    return _core.lens_directions("perspective", width, height, field_of_view)
 
 
 def fisheye(size: int, field_of_view: float = 180.0) -> NDArray[np.float64]:
     """Directions (size, size, 3) of an equidistant fisheye, 180° for Omnimax; beyond its disc NaN."""
-    if not 0 < field_of_view <= 360:
-        raise _core.InvalidArgument(f"field_of_view is {field_of_view}, expected above 0 to 360 degrees")
-    place = (np.arange(size) + 0.5) / size * 2 - 1
-    x, y = np.meshgrid(place, -place)
-    radius = np.hypot(x, y)
-    angle = radius * np.radians(field_of_view) / 2
-    across = np.sin(angle) / np.maximum(radius, 1e-12)
-    d = np.stack([across * x, across * y, -np.cos(angle)], axis=-1)
-    d[radius > 1] = np.nan
-    return d
+    return _core.lens_directions("fisheye", size, size, field_of_view)
 
 
 def background(
@@ -89,30 +74,18 @@ def background(
     Raises
     ------
     InvalidArgument
-        For other shapes, and steps below 1.
+        For other shapes, matrices that are no rotations, half a turn, and steps outside of 1 to 1024.
     """
     d = real_array("directions", directions, np.float64)
     if d.ndim != 3 or d.shape[2] != 3 or min(d.shape[:2]) < 2:
         raise _core.InvalidArgument(
             f"directions has shape {d.shape}, expected (height, width, 3), 2 at least"
         )
-    if steps < 1:
-        raise _core.InvalidArgument(f"steps is {steps}, expected 1 or more")
     start = _matrix("world_from_camera", world_from_camera)
-    maps = envmap if envmap.levels > 1 else envmap.mips()
-    seen = np.isfinite(d).all(axis=-1)
-    ddx, ddy = (np.nan_to_num(np.gradient(d, axis=axis)) for axis in (1, 0))
-    result = np.zeros((*d.shape[:2], envmap.layout.channels), np.float32)
     end = start if world_from_camera_end is None else _matrix("world_from_camera_end", world_from_camera_end)
+    maps = envmap if envmap.levels > 1 else envmap.mips()
     count = 1 if world_from_camera_end is None else steps
-    axis_angle = _axis_angle(end @ start.T)
-    for step in range(count):
-        turned = _rotated(axis_angle, (step + 0.5) / count) @ start
-        now = d[seen] @ turned.T
-        path = np.cross(axis_angle / count, now)  # of this piece
-        x, y = ddx[seen] @ turned.T, ddy[seen] @ turned.T
-        result[seen] += maps.sample(now, *_ellipse(x, y, path), filter="ewa", max_anisotropy=64) / count
-    return result
+    return _core.background(maps.layout, maps.values, np.ascontiguousarray(d), start, end, count)
 
 
 def chrome(colors: ArrayLike, directions: ArrayLike, spread: ArrayLike = 0.0) -> NDArray[np.float32]:
@@ -160,30 +133,7 @@ def chrome(colors: ArrayLike, directions: ArrayLike, spread: ArrayLike = 0.0) ->
 
 
 def _matrix(name: str, matrix: ArrayLike | None) -> NDArray[np.float64]:
-    m = np.eye(3) if matrix is None else real_array(name, matrix, np.float64)
-    if m.shape != (3, 3) or not np.allclose(m @ m.T, np.eye(3), atol=1e-4):
-        raise _core.InvalidArgument(f"{name} is not a rotation of shape (3, 3)")
+    m = np.eye(3) if matrix is None else np.ascontiguousarray(real_array(name, matrix, np.float64))
+    if m.shape != (3, 3):
+        raise _core.InvalidArgument(f"{name} has shape {m.shape}, expected (3, 3)")
     return m
-
-
-def _axis_angle(turn: NDArray[np.float64]) -> NDArray[np.float64]:
-    # The axis times the angle in radians, of turns below 180°.
-    skew = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
-    sine = float(np.linalg.norm(skew))
-    angle = np.arctan2(sine, (np.trace(turn) - 1) / 2)
-    return skew * (angle / sine if sine > 1e-12 else 1.0)
-
-
-def _rotated(axis_angle: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    angle = float(np.linalg.norm(axis_angle))
-    return rotation(axis_angle, np.degrees(angle) * share) if angle > 0 else np.eye(3)
-
-
-def _ellipse(
-    x: NDArray[np.float64], y: NDArray[np.float64], path: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    # Footprints add as covariances do: x xᵀ + y yᵀ + p pᵀ, of which the two long axes are kept.
-    covariance = sum(v[..., :, None] * v[..., None, :] for v in (x, y, path))
-    values, axes = np.linalg.eigh(covariance)
-    scaled = axes * np.sqrt(np.maximum(values, 0))[..., None, :]
-    return scaled[..., 2], scaled[..., 1]

@@ -341,9 +341,8 @@ def test_a_fisheye_photograph_of_the_sky_is_brought_to_its_place(tmp_path: Path)
     EnvMap.from_array(photograph, "fisheye:180").save(tmp_path / "sky.exr", format="float32")
     upwards = ("--from", "fisheye:180", "--to", "latlong", "--axis", 1, 0, 0, "--turn", -90)
     mb_envmap("convert", tmp_path / "sky.exr", *upwards, "-o", tmp_path / "out.exr")
-    seen = EnvMap.load(tmp_path / "out.exr").sample(
-        np.array([[0, 1, 0], [0, 0.2, 1], [0, 0.2, -1], [0, -1, 0]])
-    )
+    directions = np.array([[0, 1, 0], [0, 0.2, 1], [0, 0.2, -1], [0, -1, 0]])
+    seen = EnvMap.load(tmp_path / "out.exr").sample(directions)
     np.testing.assert_allclose(seen, [[9, 0, 0], [0, 9, 0], [1, 1, 1], [0, 0, 0]], atol=1e-5)
 
 
@@ -364,11 +363,10 @@ def test_backgrounds_are_those_of_the_library(tmp_path: Path) -> None:
     dome = background(source, fisheye(20), east)
     np.testing.assert_allclose(made("--lens", "fisheye", "--size", 20, "--look", 1, 0, 0), dome, atol=1e-5)
     rolled = background(source, perspective(24, 16, 60), None, rotation([0, 0, 1], 30), steps=4)
-    arguments = ("--size", "24x16", "--fov", 60, "--end-roll", 30, "--steps", 4)
-    np.testing.assert_allclose(made(*arguments), rolled, atol=1e-5)
+    wide = ("--size", "24x16", "--fov", 60)
+    np.testing.assert_allclose(made(*wide, "--end-roll", 30, "--steps", 4), rolled, atol=1e-5)
     panned = background(source, perspective(24, 16, 60), None, east)
-    arguments = ("--size", "24x16", "--fov", 60, "--end-look", 1, 0, 0)
-    np.testing.assert_allclose(made(*arguments), panned, atol=1e-5)
+    np.testing.assert_allclose(made(*wide, "--end-look", 1, 0, 0), panned, atol=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@
 namespace mirrorbake::tool {
 namespace {
 
-// Of a camera that looks along `look`, its up towards +Y, or towards +Z where it looks straight up and −Z where
-// it looks straight down; then rolled counter-clockwise.
+// Of a camera that looks along `look`, its up towards +Y, or towards +Z where it looks straight up and −Z
+// where it looks straight down; then rolled counter-clockwise.
 glm::dmat3 rotation_of(const char* option, const std::vector<double>& look, double roll) {
   const glm::dvec3 given(look[0], look[1], look[2]);
   const double length = glm::length(given);

@@ -24,12 +24,12 @@ std::vector<glm::dvec3> lens_directions(Lens lens, int width, int height, double
 struct BackgroundOptions {
   glm::dmat3 world_from_camera{1.0};      ///< rotation, as the shutter opens
   glm::dmat3 world_from_camera_end{1.0};  ///< rotation, as it closes
-  int steps = 1;                          ///< of every pixel's path, 1…1024, each an ellipse as long as it is
+  int steps = 1;                          ///< pieces of every pixel's path, 1…1024
 };
 
 /// Values of width × height pixels: means over every pixel and along its own path, by EWA over the levels of
-/// the map. Directions that are NaN give 0. Throws InvalidArgument for other lengths, fewer than 2 × 2 pixels,
-/// matrices that are no rotations, and a turn of 180°, which has no way.
+/// the map. Directions that are NaN give 0. Throws InvalidArgument for other lengths, fewer than 2 × 2
+/// pixels, matrices that are no rotations, and a turn of 180°, which has no way.
 std::vector<float> background(const EnvMapView& map, std::span<const glm::dvec3> directions, int width,
                               int height, const BackgroundOptions& options = {});
 

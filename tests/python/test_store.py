@@ -37,9 +37,11 @@ CONFIG = {"maps": {"size": SIZE}, "reflector": {"mesh": "/a/cow.obj"}, "views": 
 
 def make_plan(samples: int = 4) -> Plan:
     values: dict[str, bool | int | float | str] = {
-        "trace.depth": 2, "trace.samples": samples, "trace.noise": 0.02, "layers.diffuse": False,
+        "reflector.parts": "split", "trace.depth": 2, "trace.samples": samples, "trace.noise": 0.02,
+        "layers.diffuse": False,
         "layers.local": True, "layers.hull_split": False, "maps.distant": "infinite", "maps.size": SIZE,
         "views.traced": 0, "infer.passes": 2, "infer.neighbours": 0.3, "static.views": 0,
+        "maps.shared_distant": False,
     }  # fmt: skip
     decisions = (Decision(key, None, value, True, "measured", 0.25) for key, value in values.items())
     return Plan(tuple(decisions), {"shape": "infinite", "origin": [0.0, 0.0, 0.0]})
@@ -554,7 +556,7 @@ def test_a_plan_without_one_of_its_decisions_is_damaged() -> None:
     data = make_plan().to_dict()
     assert Plan.from_dict(data) == make_plan()
     del data["decisions"][0]
-    with pytest.raises(KeyError, match=r"trace\.depth"):
+    with pytest.raises(KeyError, match=r"reflector\.parts"):
         Plan.from_dict(data)
 
 

@@ -27,7 +27,7 @@ def demo_command(
     json: Json = False,
     threads: Threads = 0,
 ) -> None:
-    """Bake and evaluate a small teapot scene: about two minutes on two cores."""
+    """Bake and evaluate a small teapot scene: some minutes on two cores."""
     from mirrorbake.evaluate.demo import run_demo
 
     with _core.ThreadLimit(threads), progress() as add_bar:

@@ -1,4 +1,4 @@
-"""The ready-made demonstration: a teapot in its room, small enough for about two minutes on two cores."""
+"""The ready-made demonstration: a teapot in its room, small enough for some minutes on two cores."""
 
 from __future__ import annotations
 
@@ -31,8 +31,6 @@ def demo_config() -> SceneConfig:
             "trace": {"samples": 16},
             # What the page draws is what the maps are inferred for.
             "infer": {"fit": "display", "run_time": "Web"},
-            # It would take longer than all else here.
-            "static": {"views": 0},
         },
         "demo",
     )

@@ -41,7 +41,9 @@ void bind_targets(nb::module_& m) {
       .def_prop_ro("width", &ViewTargets::width)
       .def_prop_ro("height", &ViewTargets::height)
       .def_prop_ro("parts", &ViewTargets::parts)
-      .def_prop_ro("shells", &ViewTargets::shells);
+      .def_prop_ro("shells", &ViewTargets::shells)
+      .def_prop_ro("rejected", &ViewTargets::rejected,
+                   "Samples that were left out so far, since their light is NaN or infinite.");
 }
 
 }  // namespace

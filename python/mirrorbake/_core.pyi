@@ -1796,6 +1796,12 @@ class ViewTargets:
     @property
     def shells(self) -> int: ...
 
+    @property
+    def rejected(self) -> int:
+        """
+        Samples that were left out so far, since their light is NaN or infinite.
+        """
+
 class FitShell:
     """A shell as a part of the reflector sees it."""
 

@@ -36,18 +36,20 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
   check_length("samples.shells", samples.shells.size(), static_cast<std::size_t>(shells_),
                "those of the targets");
   check_length("samples.diffuse", samples.diffuse.size(), n, "as many as samples.pixel");
-  std::size_t bad = 0;
   for (std::size_t i = 0; i < n; ++i) {
     check_range("samples.part", static_cast<int>(samples.part[i]), 0, parts_ - 1);
     const glm::vec3 light = samples.fresnel[i] * incident_light(samples.shells, i);
-    if (!is_finite(light) || !is_finite(samples.diffuse[i])) {
-      ++bad;
-      continue;
-    }
+    const bool finite = is_finite(light) && is_finite(samples.diffuse[i]);
     const std::uint32_t column = samples.pixel[i] % static_cast<std::uint32_t>(samples.width);
     const std::uint32_t row = samples.pixel[i] / static_cast<std::uint32_t>(samples.width);
     const std::size_t pixel = (static_cast<std::size_t>(y) + row) * static_cast<std::size_t>(width_) +
                               static_cast<std::size_t>(x) + column;
+    if (!finite) {
+      // As if it had not been traced: the count of the pixel's samples is added below.
+      --traced_[pixel];
+      ++rejected_;
+      continue;
+    }
     ++counts_[at(pixel, samples.part[i])];
     reflected_[pixel] += glm::dvec3(light);
     diffuse_[pixel] += glm::dvec3(samples.diffuse[i]);
@@ -58,10 +60,6 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
       radiance_[at(pixel, samples.part[i], k)] += glm::dvec4(layer);
       light_from_[at(pixel, samples.part[i], k)] += glm::dvec3(behind);
     }
-  }
-  if (bad > 0) {
-    throw InvalidArgument("samples", "light that is not finite in " + std::to_string(bad) + " samples",
-                          "finite numbers");
   }
   for (int row = 0; row < samples.height; ++row) {
     for (int column = 0; column < samples.width; ++column) {

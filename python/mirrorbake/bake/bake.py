@@ -13,7 +13,7 @@ from mirrorbake.bake.analyze import analyze
 from mirrorbake.bake.contents import contents_of, with_static_set
 from mirrorbake.bake.estimate import Estimate, estimate
 from mirrorbake.bake.sample import SampleBaker
-from mirrorbake.bake.workers import bake_into, bake_on_workers
+from mirrorbake.bake.workers import Counts, bake_into, bake_on_workers
 from mirrorbake.errors import OptionError, StoreError
 from mirrorbake.pem.header import Source
 from mirrorbake.pem.location import GROUP_NAME, Location
@@ -137,21 +137,23 @@ def bake(
             summary.notes.extend(notes)
             store = PemStore.create(location, contents)
         if workers is not None and missing:
-            clamped = bake_on_workers(store, missing, workers, report)
+            counts = bake_on_workers(store, missing, workers, report)
         else:
-            clamped = _bake_here(stage, store, missing, report)
+            counts = _bake_here(stage, store, missing, report)
         unconverged = _unconverged(store, missing)
-    return replace(summary, clamped=clamped, unconverged=unconverged)
+    if counts.rejected:
+        summary.notes.append(f"{counts.rejected} traced samples were not finite and were left out")
+    return replace(summary, clamped=counts.clamped, unconverged=unconverged)
 
 
-def _bake_here(stage: Stage, store: PemStore, missing: Sequence[int], report: ProgressReport) -> int:
+def _bake_here(stage: Stage, store: PemStore, missing: Sequence[int], report: ProgressReport) -> Counts:
     baker = SampleBaker(stage, store.contents())
-    clamped = 0
+    counts = Counts()
     for step, index in enumerate(missing):
         report(step, len(missing), f"sample {index + 1} of {len(store.header.space)}")
-        clamped += bake_into(store, baker, index)
+        counts = counts.plus(bake_into(store, baker, index))
     report(len(missing), len(missing), f"{len(missing)} samples")
-    return clamped
+    return counts
 
 
 def _sound(store: PemStore, wanted: Sequence[int], report: ProgressReport) -> tuple[set[int], list[str]]:

@@ -44,6 +44,8 @@ class BakedSample:
     """(V, 3), where it differs from sample to sample."""
     timings: Timings
     reports: Reports
+    rejected: int = 0
+    """Samples of the views fitted that were left out, since their light was not finite."""
 
 
 class SampleBaker:
@@ -105,7 +107,8 @@ class SampleBaker:
             number = header.map_of(*name)
             maps[name] = np.ascontiguousarray(mine[number, :, : header.maps[number].channels])
         seconds = Timings(middle - start, 0.0, time.perf_counter() - middle)
-        return BakedSample(maps, own.images, irradiance, seconds, dict.fromkeys(maps, report))
+        rejected = sum(one.view.targets.rejected for one in views)
+        return BakedSample(maps, own.images, irradiance, seconds, dict.fromkeys(maps, report), rejected)
 
     def _with_neighbours(self, index: int) -> tuple[list[int], list[FitView]]:
         """Return the nodes of the fit of a sample, and what it sees."""

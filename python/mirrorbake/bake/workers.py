@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mirrorbake import _core
 from mirrorbake.bake.sample import SampleBaker
@@ -24,17 +24,31 @@ _bakers: dict[str, tuple[PemStore, SampleBaker]] = {}
 """The last scene that this process has prepared, by the PEM's fingerprint and place."""
 
 
-def bake_into(store: PemStore, baker: SampleBaker, index: int) -> int:
-    """Bake a sample and write it; returns how many of its values were clamped."""
+class Counts(NamedTuple):
+    """What a bake left out."""
+
+    clamped: int = 0
+    """Values that float16 could not hold."""
+    rejected: int = 0
+    """Traced samples whose light was NaN or infinite."""
+
+    def plus(self, other: Counts) -> Counts:
+        """Return the sum."""
+        return Counts(self.clamped + other.clamped, self.rejected + other.rejected)
+
+
+def bake_into(store: PemStore, baker: SampleBaker, index: int) -> Counts:
+    """Bake a sample and write it; returns what was left out of it."""
     baked = baker.bake(index)
     store.forget(index)
     if baked.irradiance is not None:
         store.write_irradiance(index, baked.irradiance)
-    return store.write_view(index, baked.maps, baked.images, baked.timings, baked.reports)
+    clamped = store.write_view(index, baked.maps, baked.images, baked.timings, baked.reports)
+    return Counts(clamped, baked.rejected)
 
 
-def bake_one(place: str, fingerprint: str, index: int, threads: int) -> int:
-    """Bake a sample of an existing PEM in this process; returns how many of its values were clamped.
+def bake_one(place: str, fingerprint: str, index: int, threads: int) -> Counts:
+    """Bake a sample of an existing PEM in this process; returns what was left out of it.
 
     The scene is prepared from the PEM's own attributes, once a process.
     """
@@ -81,8 +95,8 @@ def _client(workers: str) -> Iterator[tuple[Any, int]]:
 
 def bake_on_workers(
     store: PemStore, samples: Sequence[int], workers: str, progress: Callable[[int, int, str], None]
-) -> int:
-    """Bake samples on workers, in any order; returns how many values were clamped.
+) -> Counts:
+    """Bake samples on workers, in any order; returns what was left out.
 
     A worker that dies loses the sample that it was at, which another bakes again.
 
@@ -105,7 +119,7 @@ def bake_on_workers(
         A sample failed `RETRIES` times.
     """
     place = str(store.location if store.location.is_remote else store.directory.resolve())
-    clamped = 0
+    counts = Counts()
     with _client(workers) as (client, threads):
         from distributed import as_completed
 
@@ -120,6 +134,6 @@ def bake_on_workers(
             failure = future.exception()
             if failure is not None:
                 raise StoreError(f"{place}: sample {futures[future]} failed {RETRIES + 1} times: {failure}")
-            clamped += future.result()
+            counts = counts.plus(future.result())
             progress(done, len(samples), f"sample {futures[future] + 1}")
-    return clamped
+    return counts

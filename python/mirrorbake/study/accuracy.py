@@ -217,8 +217,10 @@ of the tracer and of evaluations has noise, which is
 REST = """
 Whole bakes are tested at heights of 1 mm and 1 km, of one triangle and of a needle, at fields of view of 1°
 and 170°, in one pixel, from a grazing view, under black and a million times as bright surroundings; solves
-over regularisers of 1 to 1e-8 (conditions up to 1e8) and targets over ten orders of magnitude. A solve that
-did not reach its tolerance says so (`SolveReport.converged`).
+over regularisers of 1 to 1e-8 (conditions up to 1e8), beside float64, and targets over ten orders of
+magnitude; two million triangles from tracing to the map. A solve that did not reach its tolerance says so
+(`SolveReport.converged`); traced samples that are NaN or infinite are left out, counted
+(`ViewTargets.rejected`) and reported by the bake.
 """
 
 

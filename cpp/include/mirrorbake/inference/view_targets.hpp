@@ -20,14 +20,16 @@ class ViewTargets {
   ViewTargets(int width, int height, int parts, int shells);
 
   /// Adds samples with traced light, at most one trace of every pixel. (x, y): where their image's top left
-  /// pixel lies in this one. Throws InvalidArgument if they do not fit, have no light, or light that is not
-  /// finite.
+  /// pixel lies in this one. Samples whose light is NaN or infinite count as not traced (`rejected`). Throws
+  /// InvalidArgument if they do not fit or have no light.
   void add(const SurfaceSamples& samples, int x = 0, int y = 0);
 
   int width() const { return width_; }
   int height() const { return height_; }
   int parts() const { return parts_; }
   int shells() const { return shells_; }
+  /// Samples that were left out so far, since their light is not finite.
+  std::size_t rejected() const { return rejected_; }
 
   /// Share of a pixel's traced samples that see the reflector, or one of its parts.
   float coverage(std::size_t pixel) const { return share(count(pixel), pixel); }
@@ -56,6 +58,7 @@ class ViewTargets {
   }
 
   int width_, height_, parts_, shells_;
+  std::size_t rejected_ = 0;
   std::vector<std::uint32_t> traced_;  // samples of a pixel, those beside the reflector included
   std::vector<std::uint32_t> counts_;
   std::vector<glm::dvec3> reflected_, diffuse_;

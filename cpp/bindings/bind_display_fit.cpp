@@ -31,8 +31,11 @@ void bind_targets(nb::module_& m) {
       m, "ViewTargets",
       "What maps should make a view look like: sums over traced samples, pixel by pixel, so that "
       "a view of many\nsamples never has to be in memory at once.")
-      .def(nb::init<int, int, int, int>(), nb::arg("width"), nb::arg("height"), nb::arg("parts"),
-           nb::arg("shells"))
+      .def(nb::init<int, int, int, int, const ViewTargets::Stacks&>(), nb::arg("width"), nb::arg("height"),
+           nb::arg("parts"), nb::arg("shells"), nb::arg("stacks") = ViewTargets::Stacks{},
+           "`stacks`: for each part, front to back, the number of the traced shell that each of its own "
+           "shells "
+           "ends\nwith; empty: the traced ones.")
       .def("add", &ViewTargets::add, nb::arg("samples"), nb::arg("x") = 0, nb::arg("y") = 0,
            nb::call_guard<nb::gil_scoped_release>(),
            "Adds samples with traced light, at most one trace of every pixel; (x, y): where their image's "

@@ -1776,7 +1776,11 @@ class ViewTargets:
     samples never has to be in memory at once.
     """
 
-    def __init__(self, width: int, height: int, parts: int, shells: int) -> None: ...
+    def __init__(self, width: int, height: int, parts: int, shells: int, stacks: Sequence[Sequence[int]] = []) -> None:
+        """
+        `stacks`: for each part, front to back, the number of the traced shell that each of its own shells ends
+        with; empty: the traced ones.
+        """
 
     def add(self, samples: SurfaceSamples, x: int = 0, y: int = 0) -> None:
         """

@@ -95,7 +95,7 @@ def test_bounces_end_where_they_change_the_picture_by_less_than_the_tolerance(tm
     for tolerance in (0.3, 0.1, 0.01):
         stage = make_stage(tmp_path, RING, auto={"tolerance": tolerance})
         decision = of(analyze(stage), "trace.depth")
-        depths.append(int(decision.value))
+        depths.append(cast("int", decision.value))
         assert decision.measured is not None
         assert decision.measured <= tolerance
         # The picture itself, to the depth that was found and to one that leaves nothing out.

@@ -19,7 +19,7 @@ from mirrorbake.errors import StoreError
 from mirrorbake.pem.header import Header, Source
 from mirrorbake.pem.pyramid import coarser_sizes, decimate, join_pyramid, residual_texels, split_pyramid
 from mirrorbake.pem.schema import checksum_of
-from mirrorbake.pem.shells import Part, Shell
+from mirrorbake.pem.shells import Part, Shell, ShellRule
 from mirrorbake.pem.store import GROUP_NAME, Contents, PemStore, SolverReport, Timings, exclusive
 from mirrorbake.pem.verify import verify
 from mirrorbake.pem.view_images import ViewImages
@@ -36,9 +36,10 @@ CONFIG = {"maps": {"size": SIZE}, "reflector": {"mesh": "/a/cow.obj"}, "views": 
 
 
 def make_plan(samples: int = 4) -> Plan:
-    values: dict[str, bool | int | float | str] = {
+    values: dict[str, Any] = {
         "reflector.parts": "split", "trace.depth": 2, "trace.samples": samples, "trace.noise": 0.02,
         "layers.diffuse": False,
+        "shells": [{"name": "local", "objects": ["itself"]}, {"name": "distant"}],
         "layers.local": True, "layers.hull_split": False, "maps.distant": "infinite", "maps.size": SIZE,
         "views.traced": 0, "infer.passes": 2, "infer.neighbours": 0.3, "static.views": 0,
         "maps.shared_distant": False,
@@ -49,7 +50,7 @@ def make_plan(samples: int = 4) -> Plan:
 
 def make_header(**changes: Any) -> Header:
     proxy: dict[str, Any] = {"shape": "infinite", "origin": [0.0, 0.0, 0.0]}
-    distant = Shell("distant", proxy, "body/distant", "all", "rest", moves=False)
+    distant = Shell("distant", proxy, "body/distant", "all", moves=False)
     header = Header(
         source=Source(
             "1.2.3",
@@ -58,8 +59,9 @@ def make_header(**changes: Any) -> Header:
         ),
         plan=make_plan(),
         space=ParameterSpace((Axis("arc", (0.0, 0.5, 1.0), 0.0, 1.0),)),
+        rules=(ShellRule("local", ("itself",)), ShellRule("distant")),
         parts=(
-            Part("body", (Shell("local", proxy, "body/local", "all", "itself", moves=True), distant)),
+            Part("body", (Shell("local", proxy, "body/local", "all", moves=True), distant)),
             Part("lid", (dataclasses.replace(distant, map="lid/distant"),)),
         ),
         static={"infinite": proxy, "proxy": None, "fade": None},

@@ -10,12 +10,45 @@
 
 namespace mirrorbake {
 
-ViewTargets::ViewTargets(int width, int height, int parts, int shells)
+namespace {
+
+std::vector<int> own_shells(const ViewTargets::Stacks& stacks, int parts, int shells) {
+  std::vector<int> result;
+  if (!stacks.empty()) check_length("stacks", stacks.size(), static_cast<std::size_t>(parts), "one per part");
+  for (int part = 0; part < parts; ++part) {
+    int own = 0;
+    for (int shell = 0; shell < shells; ++shell) {
+      result.push_back(own);
+      if (stacks.empty() || shell == stacks[static_cast<std::size_t>(part)][static_cast<std::size_t>(own)])
+        ++own;
+    }
+  }
+  return result;
+}
+
+void check_stacks(const ViewTargets::Stacks& stacks, int shells) {
+  for (std::size_t part = 0; part < stacks.size(); ++part) {
+    const std::vector<int>& ends = stacks[part];
+    bool rises = !ends.empty() && ends.front() >= 0 && ends.back() == shells - 1;
+    for (std::size_t k = 1; k < ends.size(); ++k) rises = rises && ends[k - 1] < ends[k];
+    if (rises) continue;
+    std::string given;
+    for (const int end : ends) given += (given.empty() ? "" : ", ") + std::to_string(end);
+    throw InvalidArgument("stacks[" + std::to_string(part) + "]", "[" + given + "]",
+                          "rising numbers of shells that end with " + std::to_string(shells - 1));
+  }
+}
+
+}  // namespace
+
+ViewTargets::ViewTargets(int width, int height, int parts, int shells, const Stacks& stacks)
     : width_(width), height_(height), parts_(parts), shells_(shells) {
   check_range("width", width, 1, 16384);
   check_range("height", height, 1, 16384);
   check_range("parts", parts, 1, 65536);
   check_range("shells", shells, 1, 64);
+  check_stacks(stacks, shells);
+  own_shell_ = own_shells(stacks, parts, shells);
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   traced_.resize(pixels);
   counts_.resize(pixels * static_cast<std::size_t>(parts));
@@ -53,12 +86,17 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
     ++counts_[at(pixel, samples.part[i])];
     reflected_[pixel] += glm::dvec3(light);
     diffuse_[pixel] += glm::dvec3(samples.diffuse[i]);
+    const int* own = own_shell_.data() + std::size_t{samples.part[i]} * static_cast<std::size_t>(shells_);
     glm::vec3 behind(0.0F);
+    glm::vec4 stacked(0.0F);
     for (int k = shells_ - 1; k >= 0; --k) {
       const glm::vec4 layer = samples.shells[static_cast<std::size_t>(k)].radiance[i];
       behind = glm::vec3(layer) + (1.0F - layer.a) * behind;
-      radiance_[at(pixel, samples.part[i], k)] += glm::dvec4(layer);
-      light_from_[at(pixel, samples.part[i], k)] += glm::dvec3(behind);
+      const bool is_last = k == shells_ - 1 || own[k + 1] != own[k];
+      stacked = is_last ? layer : layer + (1.0F - layer.a) * stacked;
+      if (k > 0 && own[k - 1] == own[k]) continue;
+      radiance_[at(pixel, samples.part[i], own[k])] += glm::dvec4(stacked);
+      light_from_[at(pixel, samples.part[i], own[k])] += glm::dvec3(behind);
     }
   }
   for (int row = 0; row < samples.height; ++row) {

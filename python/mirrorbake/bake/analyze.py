@@ -19,9 +19,17 @@ from mirrorbake.bake.probe import (
     relative_spread,
 )
 from mirrorbake.bake.quality import QUALITIES, quality_decisions
+from mirrorbake.bake.shell_shapes import (
+    MIN_HITS,
+    planned_shells,
+    reflector_origin,
+    shell_distances,
+    shells_decision,
+)
 from mirrorbake.bake.worth import advice_of, shared_distant
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, hull_triangles, proxy_to_attributes
+from mirrorbake.scene.config_shells import DEFAULT_SHELLS, ITSELF
 from mirrorbake.scene.plan import Decision, Plan
 
 if TYPE_CHECKING:
@@ -49,8 +57,6 @@ TEXELS_PER_LOBE = 4
 
 LARGEST_BOX = 1e5
 """Radii of the object; hits further away are as good as infinite and do not shape the walls of a box."""
-MIN_HITS = 100
-"""Below this many reflected rays there is nothing to fit a shape to."""
 
 _SET = "set in the scene"
 
@@ -74,28 +80,36 @@ def analyze(stage: Stage) -> Plan:
     parts, labels = parts_decision(stage, probe)
     stage = stage.in_parts(cast("Parts", parts.value))
     if depth.automatic and depth.value != MAX_DEPTH:
-        probe = Probe.of(stage, int(depth.value))
+        probe = Probe.of(stage, cast("int", depth.value))
     elif labels is not None:
         probe = replace(probe, part=labels[probe.triangle].astype(np.int64))
+    shells = shells_decision(stage)
     distant, proxy = _distant(stage, probe)
     on_hull = hull_triangles(stage.built.positions, stage.built.triangles)[probe.triangle]
     local = _local(stage, probe, on_hull)
-    samples = _samples(stage, int(depth.value))
+    samples = _samples(stage, cast("int", depth.value))
     size = _map_size(stage, proxy)
     decisions = [
         parts,
         depth,
         samples,
         _diffuse(stage, probe),
+        shells,
         *local,
         _hull_split(stage, on_hull, any_local=any(decision.value for decision in local)),
         distant,
         size,
         shared_distant(stage, probe, proxy),
-        *quality_decisions(stage, int(samples.value)),
+        *quality_decisions(stage, cast("int", samples.value)),
     ]
-    advice = advice_of(stage, probe, proxy, int(size.value))
-    return Plan(tuple(decisions), proxy_to_attributes(proxy), tuple(advice))
+    advice = advice_of(stage, probe, proxy, cast("int", size.value))
+    has_local = {name: _is_local(local, name) for name in stage.built.part_names}
+    planned = planned_shells(stage, probe, has_local, proxy)
+    return Plan(tuple(decisions), proxy_to_attributes(proxy), planned, tuple(advice))
+
+
+def _is_local(local: Sequence[Decision], part: str) -> bool:
+    return any(bool(decision.value) for decision in local if decision.part in (None, part))
 
 
 def _depth(stage: Stage, full: Probe) -> Decision:
@@ -175,7 +189,11 @@ def _local(stage: Stage, probe: Probe, on_hull: NDArray[np.bool_]) -> list[Decis
     config, built = stage.config, stage.built
     if config.layers.local is not None:
         return [Decision("layers.local", None, config.layers.local, False, _SET, None)]
-    without = probe.diffuse + probe.fresnel * probe.distant
+    sections = config.shells or DEFAULT_SHELLS
+    mine = next((k for k, shell in enumerate(sections) if shell.objects == (ITSELF,)), None)
+    if mine is None:
+        return [Decision("layers.local", None, False, True, "no shell holds the object alone", None)]
+    without = probe.diffuse + probe.fresnel * probe.without(mine)
     decisions = []
     for number, name in enumerate(built.part_names):
         chosen = probe.part == number
@@ -187,7 +205,7 @@ def _local(stage: Stage, probe: Probe, on_hull: NDArray[np.bool_]) -> list[Decis
         else:
             change = relative_change(probe.beauty[chosen], without[chosen], probe.pixel[chosen])
             value = change > config.auto.tolerance
-            share = float(np.mean(probe.local[chosen, 3]))
+            share = float(np.mean(probe.shells[mine][chosen, 3]))
             reason = (
                 f"what the object reflects of itself changes the picture by {change:.2%}: {share:.1%} of the "
                 f"rays meet it again; {float(inside.mean()):.0%} of what is seen is off the convex hull"
@@ -209,11 +227,13 @@ def _hull_split(stage: Stage, on_hull: NDArray[np.bool_], *, any_local: bool) ->
 
 def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
     maps, built = stage.config.maps, stage.built
-    origin = _core.area_weighted_centroid(built.positions, built.triangles)
-    wanted = maps.distant
+    origin = reflector_origin(stage)
+    wanted: str | None = maps.distant
+    if stage.config.shells is not None and stage.config.shells[-1].proxy != "auto":
+        wanted = stage.config.shells[-1].proxy
     if wanted == "infinite":
         return Decision("maps.distant", None, wanted, False, _SET, None), _core.Proxy.infinite(origin)
-    distances = _distances(stage, probe)
+    distances = shell_distances(stage, probe, len(stage.shell_rules) - 1)
     usable = distances > 0.0
     radius = 0.5 * float(np.linalg.norm(np.ptp(built.positions, axis=0)))
     near = usable & (distances < LARGEST_BOX * radius)
@@ -242,20 +262,6 @@ def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
         return Decision("maps.distant", None, wanted, False, _SET, None), proxy
     reason = choice.reason.removeprefix(f"{best.name}: ").removesuffix(".")
     return Decision("maps.distant", None, best.name, True, reason, best.off_view_error), proxy
-
-
-def _distances(stage: Stage, probe: Probe) -> FloatArray:
-    """Lengths (n,) of the reflected rays up to the surroundings, metres."""
-    distances = np.empty(len(probe.view), np.float32)
-    for number, point in enumerate(probe_points(stage)):
-        chosen = probe.view == number
-        moved = stage.at(point)
-        distances[chosen], _ = moved.tracer.intersect_distance(
-            np.ascontiguousarray(probe.position[chosen]),
-            np.ascontiguousarray(probe.reflection[chosen]),
-            [moved.built.reflector],
-        )
-    return distances
 
 
 def _fit_box(how: str, hits: FloatArray, origin: Sequence[float], bottom: float) -> _core.Proxy:

@@ -14,9 +14,10 @@ from mirrorbake.bake.static_set import infer_static_set
 from mirrorbake.pem.header import Header
 from mirrorbake.pem.pyramid import capture
 from mirrorbake.pem.run_time import TRACED_SAMPLES
-from mirrorbake.pem.shells import Part, Shell
+from mirrorbake.pem.shells import Part, Shell, ShellRule
 from mirrorbake.pem.store import Contents
 from mirrorbake.proxy import hull_triangles, proxy_to_attributes
+from mirrorbake.scene.config_shells import ITSELF
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from mirrorbake.scene.config import SceneConfig
     from mirrorbake.scene.plan import Plan
     from mirrorbake.scene.stage import Stage
-
-SHARED_MAP = "distant"
-"""Name of a distant map that all parts read."""
 
 
 def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
@@ -60,6 +58,10 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
         source=source,
         plan=plan,
         space=built.space,
+        rules=tuple(
+            ShellRule(table["name"], tuple(table.get("objects", ())), table.get("nearer_than"))
+            for table in plan.shell_tables
+        ),
         parts=tuple(_part(built, plan, number, shared=shared) for number in range(len(built.part_names))),
         static={
             "infinite": proxy_to_attributes(_core.Proxy.infinite(origin)),
@@ -119,15 +121,29 @@ def _run_time(config: SceneConfig, plan: Plan) -> dict[str, Any]:
 
 def _part(built: BuiltScene, plan: Plan, number: int, *, shared: bool) -> Part:
     name = built.part_names[number]
+    hull: Literal["all", "off hull"] = "off hull" if plan.has_hull_split else "all"
     shells = []
-    if plan.has_local(name):
-        triangles = built.triangles[built.parts == number]
-        centre = _core.area_weighted_centroid(built.positions, triangles)
-        ellipsoid = _core.fit_ellipsoid(built.positions[np.unique(triangles)], centre)
-        polygons: Literal["all", "off hull"] = "off hull" if plan.has_hull_split else "all"
+    for planned, table in zip(plan.shells, plan.shell_tables, strict=True):
+        if name not in planned.parts:
+            continue
+        # A map that all parts read bears the name of its shell alone.
+        is_last = planned is plan.shells[-1]
+        its_map = planned.name if is_last and shared else f"{name}/{planned.name}"
+        itself = table.get("objects") == [ITSELF]
+        # Polygons on the convex hull cannot reflect the object.
         shells.append(
-            Shell("local", proxy_to_attributes(ellipsoid), f"{name}/local", polygons, "itself", moves=True)
+            Shell(
+                planned.name,
+                planned.proxy or _ellipsoid_about(built, number),
+                its_map,
+                hull if itself else "all",
+                moves=itself,
+            )
         )
-    distant = SHARED_MAP if shared else f"{name}/distant"
-    shells.append(Shell("distant", plan.distant, distant, "all", "rest", moves=False))
     return Part(name, tuple(shells))
+
+
+def _ellipsoid_about(built: BuiltScene, number: int) -> dict[str, Any]:
+    triangles = built.triangles[built.parts == number]
+    centre = _core.area_weighted_centroid(built.positions, triangles)
+    return proxy_to_attributes(_core.fit_ellipsoid(built.positions[np.unique(triangles)], centre))

@@ -12,7 +12,7 @@ from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.store import SolverReport
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -56,13 +56,13 @@ class DisplayFitter:
         self._options = _core.DisplayFitOptions(solve=solve_options(infer), passes=infer.passes)
         self._numbers = {entry.name: number for number, entry in enumerate(header.maps)}
 
-    def captured_prior(self, capture: FloatArray) -> FloatArray:
-        """Return RGB of all maps (M, T, 3): a captured pyramid for those that hold the rest, else black."""
+    def captured_prior(self, captured: Mapping[str, FloatArray]) -> FloatArray:
+        """Return RGB of all maps (M, T, 3): of shells that are captured their pyramids (T, 3), else black."""
         prior = np.zeros((len(self._numbers), self._header.topology.texels, 3), np.float32)
         for part in self._header.parts:
             for shell in part.shells:
-                if shell.rule == "rest":
-                    prior[self._numbers[shell.map]] = capture
+                if shell.name in captured:
+                    prior[self._numbers[shell.map]] = captured[shell.name]
         return prior
 
     def fit(

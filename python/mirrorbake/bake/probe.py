@@ -53,8 +53,8 @@ class Probe:
     beauty: DoubleArray
     diffuse: DoubleArray
     fresnel: DoubleArray
-    local: DoubleArray
-    distant: DoubleArray
+    shells: tuple[DoubleArray, ...]
+    """Premultiplied radiance and α (n, 4) of each shell, front to back."""
 
     @staticmethod
     def of(stage: Stage, depth: int, samples_per_pixel: int = PROBE_SAMPLES) -> Probe:
@@ -63,7 +63,10 @@ class Probe:
         size = (max(1, round(scale * width)), max(1, round(scale * height)))
         # The same random numbers at every depth: what differs are the bounces alone.
         options = _core.TraceOptions(
-            samples_per_pixel=samples_per_pixel, max_specular_depth=depth, seed=stage.config.trace.seed
+            samples_per_pixel=samples_per_pixel,
+            max_specular_depth=depth,
+            seed=stage.config.trace.seed,
+            shells=stage.shell_rules,
         )
         traces = [
             moved.tracer.trace_layers(
@@ -92,15 +95,22 @@ class Probe:
             beauty=np.concatenate([np.asarray(trace.sample_beauty) for trace in traces]).astype(np.float64),
             diffuse=joined("diffuse").astype(np.float64),
             fresnel=joined("fresnel").astype(np.float64),
-            local=light(0).astype(np.float64),
-            distant=light(1)[:, :3].astype(np.float64),
+            shells=tuple(light(shell).astype(np.float64) for shell in range(len(options.shells))),
         )
 
     @property
     def incident(self) -> DoubleArray:
         """Radiance that arrives along the reflected rays."""
-        incident: DoubleArray = self.local[:, :3] + (1.0 - self.local[:, 3:]) * self.distant
-        return incident
+        return self.without(None)
+
+    def without(self, shell: int | None) -> DoubleArray:
+        """Return what would arrive, if a shell were not there."""
+        light: DoubleArray = self.shells[-1][:, :3]
+        for number in range(len(self.shells) - 2, -1, -1):
+            if number != shell:
+                layer = self.shells[number]
+                light = layer[:, :3] + (1.0 - layer[:, 3:]) * light
+        return light
 
 
 def pixel_means(values: DoubleArray, pixel: NDArray[np.int64]) -> DoubleArray:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.captured import captured_pyramids
 from mirrorbake.bake.fit import DisplayFitter, FitView, solve_options
 from mirrorbake.bake.static_set import static_views
 from mirrorbake.bake.targets import ViewTracer
-from mirrorbake.pem.pyramid import capture, pyramid_of
 from mirrorbake.pem.run_time import lookups_of
 from mirrorbake.pem.store import SolverReport, Timings
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
@@ -20,8 +20,9 @@ from mirrorbake.scene.neighbourhood import beside, block, views_around
 from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from mirrorbake.arrays import FloatArray
-    from mirrorbake.pem.shells import Part, Shell
     from mirrorbake.pem.store import Contents
     from mirrorbake.scene.parameters import Point
     from mirrorbake.scene.stage import Stage
@@ -54,7 +55,7 @@ class SampleBaker:
     def __init__(self, stage: Stage, contents: Contents) -> None:
         self._stage = stage
         self._header = contents.header
-        self._capture = pyramid_of(contents.capture, contents.header.projection)
+        self._captured = captured_pyramids(stage, contents.header, contents.capture)
         self._static_maps = contents.static_maps
         self._local_triangles = contents.local_triangles
         self._topology = contents.header.topology
@@ -73,18 +74,18 @@ class SampleBaker:
             irradiance = stage.tracer.vertex_irradiance(
                 stage.built.reflector, DIFFUSE_RAYS, stage.config.trace.seed
             )
-        capture = self._capture_of(stage)
+        captured = captured_pyramids(stage, self._header) if stage.place else self._captured
         pose = Pose.of(self._stage.config, self._header.space.scene_coordinates(point).get("motion", 0.0))
         if self._infer.fit == "display":
-            return self._fit_display(index, stage, pose, capture, irradiance, start)
-        return self._fit_layers(point, pose, capture, irradiance, start)
+            return self._fit_display(index, stage, pose, captured, irradiance, start)
+        return self._fit_layers(point, pose, captured, irradiance, start)
 
     def _fit_display(
         self,
         index: int,
         stage: Stage,
         pose: Pose,
-        capture: FloatArray,
+        captured: Mapping[str, FloatArray],
         irradiance: FloatArray | None,
         start: float,
     ) -> BakedSample:
@@ -96,7 +97,7 @@ class SampleBaker:
             nodes, views = self._with_neighbours(index)
         prior: FloatArray | None = None
         if self._infer.prior == "captured":
-            prior = self._fitter.captured_prior(capture)
+            prior = self._fitter.captured_prior(captured)
             if self._static_maps is not None:
                 prior = np.ascontiguousarray(self._static_maps[..., :3])
         middle = time.perf_counter()
@@ -131,7 +132,12 @@ class SampleBaker:
         return nodes, views
 
     def _fit_layers(
-        self, point: Point, pose: Pose, capture: FloatArray, irradiance: FloatArray | None, start: float
+        self,
+        point: Point,
+        pose: Pose,
+        captured: Mapping[str, FloatArray],
+        irradiance: FloatArray | None,
+        start: float,
     ) -> BakedSample:
         trace = self._stage.trace(point)
         lookup = lookups_of(self._infer.footprint_scale)
@@ -142,19 +148,23 @@ class SampleBaker:
             start = time.perf_counter()
             matrices, targets, prior = [], [], None
             readers = []
-            for number, part in enumerate(self._header.parts):
-                for shell in part.shells:
+            for number, (part, ends) in enumerate(zip(self._header.parts, self._header.stacks, strict=True)):
+                for place, shell in enumerate(part.shells):
                     if shell.map != entry.name:
                         continue
                     readers.append((part.name, shell.name))
-                    prior = capture if shell.rule == "rest" else None
+                    # Channels beyond colour have no prior.
+                    prior = captured.get(shell.name) if entry.channels == 3 else None
                     off_hull = self._local_triangles if shell.polygons == "off hull" else None
                     matrix = _core.build_rendering_matrix(
                         trace.samples, number, shell.proxy_at(pose), self._topology, lookup, off_hull
                     )
                     if matrix.rows:
                         matrices.append(matrix)
-                        targets.append(matrix.row_means(_incident(trace.samples, part, shell)))
+                        first = 0 if place == 0 else ends[place - 1] + 1
+                        targets.append(
+                            matrix.row_means(_incident(trace.samples, first, ends[place], entry.channels))
+                        )
             middle = time.perf_counter()
             texels, report = self._infer_layer(matrices, targets, prior, entry.channels)
             maps.update(dict.fromkeys(readers, texels))
@@ -162,20 +172,6 @@ class SampleBaker:
             seconds[1] += middle - start
             seconds[2] += time.perf_counter() - middle
         return BakedSample(maps, images_of_trace(trace), irradiance, Timings(*seconds), reports)
-
-    def _capture_of(self, stage: Stage) -> FloatArray:
-        if not stage.place:
-            return self._capture
-        header = self._header
-        captured = capture(
-            stage.tracer,
-            header.plan.distant["origin"],
-            header.projection,
-            header.map_size,
-            [stage.built.reflector],
-            self._stage.options,
-        )
-        return pyramid_of(captured, header.projection)
 
     def _infer_layer(
         self,
@@ -204,10 +200,10 @@ class SampleBaker:
         )
 
 
-def _incident(samples: _core.SurfaceSamples, part: Part, shell: Shell) -> FloatArray:
-    """Return the radiance that a shell holds, per sample; a single shell holds all that arrives."""
-    local = np.asarray(samples.shells[0].radiance)
-    if shell.rule == "itself":
-        return local
-    distant = np.asarray(samples.shells[1].radiance)[:, :3]
-    return distant if len(part.shells) > 1 else local[:, :3] + (1.0 - local[:, 3:]) * distant
+def _incident(samples: _core.SurfaceSamples, first: int, last: int, channels: int) -> FloatArray:
+    """Return the light of the traced shells from one to another, per sample (n, channels)."""
+    light = np.asarray(samples.shells[last].radiance)[:, :channels]
+    for number in range(last - 1, first - 1, -1):
+        layer = np.asarray(samples.shells[number].radiance)
+        light = layer[:, :channels] + (1.0 - layer[:, 3:]) * light
+    return light

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mirrorbake.bake.captured import captured_pyramids
 from mirrorbake.bake.fit import DisplayFitter, FitView
 from mirrorbake.bake.targets import ViewTracer
 from mirrorbake.pem.layout import read_back, stored_map
-from mirrorbake.pem.pyramid import pyramid_of
 from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def infer_static_set(
     views = static_views(ViewTracer(stage, header), stage, report)
     prior = None
     if stage.config.infer.prior == "captured":
-        prior = fitter.captured_prior(pyramid_of(contents.capture, header.projection))
+        prior = fitter.captured_prior(captured_pyramids(stage, header, contents.capture))
     texels, solver = fitter.fit(views, Pose.of(stage.config, 0.0), prior)
     stored = [read_back(stored_map(pyramid, header)[0], header) for pyramid in texels[0]]
     return np.stack(stored), solver

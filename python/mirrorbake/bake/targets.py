@@ -25,8 +25,6 @@ BATCH = 1 << 22
 """Samples that are held at a time, were the object to fill the frame."""
 KEPT_BYTES = 1 << 30
 """Memory for views that later samples may need again."""
-TRACED_SHELLS = 2
-"""That the tracer tells apart: the object itself, and all else."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +46,11 @@ class ViewTracer:
 
     def __init__(self, stage: Stage, header: Header) -> None:
         self._stage = stage
-        self._parts = len(header.parts)
+        self._parts, self._shells, self._stacks = len(header.parts), len(header.rules), header.stacks
         self._places = model_of(header.run_time).places
         width, height = stage.built.cameras.size
         # Sums per pixel, part and shell, and lookups over a third of the frame.
-        size = width * height * (48 + self._parts * (4 + 56 * TRACED_SHELLS) + 60 * len(self._places))
+        size = width * height * (48 + self._parts * (4 + 56 * self._shells) + 60 * len(self._places))
         self._most = max(KEPT_BYTES // size, 3)
         self._kept: OrderedDict[Point, TracedView] = OrderedDict()
 
@@ -69,7 +67,7 @@ class ViewTracer:
 
     def trace(self, stage: Stage, camera: _core.Camera) -> TracedView:
         """Return the whole view of a camera, in the scene of a stage."""
-        targets = _core.ViewTargets(camera.width, camera.height, self._parts, TRACED_SHELLS)
+        targets = self._targets(camera.width, camera.height)
         bands = []
         for y, traced in self._bands(stage, camera):
             targets.add(traced.samples, 0, y)
@@ -87,9 +85,12 @@ class ViewTracer:
         if not len(lookups):
             return None
         traced = stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(window))
-        targets = _core.ViewTargets(window[2], window[3], self._parts, TRACED_SHELLS)
+        targets = self._targets(window[2], window[3])
         targets.add(traced.samples)
         return TracedView(lookups, targets, images_of_trace(traced))
+
+    def _targets(self, width: int, height: int) -> _core.ViewTargets:
+        return _core.ViewTargets(width, height, self._parts, self._shells, self._stacks)
 
     def _bands(self, stage: Stage, camera: _core.Camera) -> Iterator[tuple[int, _core.LayerTrace]]:
         rows = max(1, BATCH // (camera.width * stage.options.samples_per_pixel))

@@ -14,7 +14,7 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.pem.pyramid import FACES, Projection, coarser_sizes, topology_of
 from mirrorbake.pem.schema import FORMAT_VERSION, checksum_of
-from mirrorbake.pem.shells import MapEntry, Part, Shell, maps_of
+from mirrorbake.pem.shells import MapEntry, Part, Shell, ShellRule, maps_of
 from mirrorbake.scene.parameters import ParameterSpace
 from mirrorbake.scene.plan import Plan
 
@@ -63,6 +63,10 @@ class Source:
             return f"mirrorbake {other.library} instead of {self.library}"
         mine, others = self._content(), other._content()
         for section, table in mine.items():
+            if not isinstance(table or {}, dict) or not isinstance(others[section] or {}, dict):
+                if table != others[section]:
+                    return f"{section} = {others[section]!r} instead of {table!r}"
+                continue
             present = others[section] or {}
             for key, value in (table or {}).items():
                 theirs = present.get(key)
@@ -96,6 +100,8 @@ class Header:
     """What was decided before the bake; a resumed one keeps to it."""
     space: ParameterSpace
     """At whose nodes the maps are."""
+    rules: tuple[ShellRule, ...]
+    """What reflected rays meet, split front to back."""
     parts: tuple[Part, ...]
     """Of the reflector, in order."""
     static: dict[str, Any]
@@ -142,6 +148,7 @@ class Header:
             "image_size": list(self.image_size),
             "origin": list(self.origin),
             "space": self.space.to_attributes(),
+            "shells": [asdict(rule) for rule in self.rules],
             "parts": [asdict(part) | {"shells": [asdict(s) for s in part.shells]} for part in self.parts],
             "maps": [asdict(entry) for entry in self.maps],
             "static": self.static,
@@ -170,6 +177,10 @@ class Header:
             source=Source(attributes["library"], attributes["config"], attributes["inputs"]),
             plan=Plan.from_dict(attributes["plan"]),
             space=ParameterSpace.from_attributes(attributes["space"]),
+            rules=tuple(
+                ShellRule(rule["name"], tuple(rule["objects"]), rule["nearer_than"])
+                for rule in attributes["shells"]
+            ),
             parts=tuple(parts),
             static=attributes["static"],
             projection=attributes["projection"],
@@ -194,6 +205,15 @@ class Header:
     def is_static_set(self) -> bool:
         """Whether the maps have no parameters: they were inferred from views all around."""
         return bool(self.source.config["views"]["kind"] == "none")
+
+    @property
+    def stacks(self) -> list[list[int]]:
+        """For each part, the numbers of the rules that its shells end with.
+
+        A shell holds what its own rule does and those before it that no other shell of the part holds.
+        """
+        numbers = {rule.name: number for number, rule in enumerate(self.rules)}
+        return [[numbers[shell.name] for shell in part.shells] for part in self.parts]
 
     @property
     def maps(self) -> tuple[MapEntry, ...]:

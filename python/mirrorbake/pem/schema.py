@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from mirrorbake import _core
 from mirrorbake.errors import StoreError
 from mirrorbake.proxy import proxy_from_attributes
 from mirrorbake.scene.config_values import MAX_IMAGE_SIDE, MAX_MAP_SIZE
@@ -72,8 +73,15 @@ class ShellAttributes(_Model):
     proxy: ProxyAttributes
     map: Annotated[str, Field(min_length=1, max_length=2000)]
     polygons: Literal["all", "off hull"]
-    rule: Literal["itself", "rest"]
     moves: bool
+
+
+class RuleAttributes(_Model):
+    """What a shell holds of reflected rays."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
+    objects: Annotated[list[Annotated[str, Field(min_length=1, max_length=1000)]], Field(max_length=10_000)]
+    nearer_than: Annotated[Number, Field(gt=0)] | None
 
 
 class PartAttributes(_Model):
@@ -128,6 +136,7 @@ class Attributes(_Model):
     ]
     origin: Triple
     space: Annotated[list[AxisAttributes], Field(max_length=8)]
+    shells: Annotated[list[RuleAttributes], Field(min_length=1, max_length=_core.MOST_SHELLS)]
     parts: Annotated[list[PartAttributes], Field(min_length=1, max_length=MAX_PARTS)]
     maps: Annotated[list[MapAttributes], Field(min_length=1, max_length=64 * MAX_PARTS)]
     static: StaticAttributes
@@ -149,7 +158,15 @@ class Attributes(_Model):
         if count > MAX_SAMPLES:
             raise ValueError(f"the space has {count} samples, at most {MAX_SAMPLES} are possible")
         known = {entry.name: entry.channels for entry in self.maps}
+        rules = [rule.name for rule in self.shells]
+        if len(set(rules)) < len(rules):
+            raise ValueError("shells: two of one name")
         for part in self.parts:
+            names = [shell.name for shell in part.shells]
+            if names != [name for name in rules if name in names] or names[-1] != rules[-1]:
+                raise ValueError(
+                    f"part {part.name}: its shells are not some of {', '.join(rules)} with the last"
+                )
             for shell in part.shells:
                 if known.get(shell.map) != (3 if shell is part.shells[-1] else 4):
                     raise ValueError(f"shell {shell.name} of {part.name}: no such map: {shell.map}")

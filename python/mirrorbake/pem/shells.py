@@ -8,29 +8,46 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mirrorbake.proxy import proxy_from_attributes
+from mirrorbake.scene.config_shells import ITSELF
 
 if TYPE_CHECKING:
     from mirrorbake import _core
     from mirrorbake.scene.pose import Pose
 
 HullPolygons = Literal["all", "off hull"]
-Rule = Literal["itself", "rest"]
+
+
+@dataclass(frozen=True)
+class ShellRule:
+    """What of a reflected ray a shell holds: what it meets first, where it is of this kind."""
+
+    name: str
+    objects: tuple[str, ...] = ()
+    """Names in the scene, `itself` of the reflector; none: all, lights and the background included."""
+    nearer_than: float | None = None
+    """Metres along the ray; None: at any distance."""
+
+    @property
+    def is_itself(self) -> bool:
+        """Whether it holds nothing but what the object reflects of itself."""
+        return self.objects == (ITSELF,)
 
 
 @dataclass(frozen=True)
 class Shell:
-    """One shell of a part: a map on a shape, and which reflected rays it answers."""
+    """One shell of a part: a map on a shape, which holds what its rule does.
+
+    And what the rules before it do, as far as no other shell of the part holds that.
+    """
 
     name: str
-    """`local` and `distant` are the names of the default two."""
+    """Of its rule; `local` and `distant` are the names of the default two."""
     proxy: dict[str, Any]
     """As `mirrorbake.proxy.proxy_to_attributes` returns it, with the object at rest."""
     map: str
     """Name of the map that lies on it; parts may share one."""
     polygons: HullPolygons
     """Whether polygons on the object's convex hull read it."""
-    rule: Rule
-    """What it holds: what the object reflects of itself, or the rest of what the shells before it do not."""
     moves: bool
     """Whether the shape moves with the object."""
 

@@ -14,6 +14,7 @@ from mirrorbake.scene.origin import Origin, loaded_nearby
 from mirrorbake.scene.parameters import ParameterSpace, Point, format_point, space_of
 from mirrorbake.scene.pose import Pose
 from mirrorbake.scene.reflector import add_reflector, named_object
+from mirrorbake.scene.shell_rules import trace_rules
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -75,6 +76,8 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     pose = Pose.of(config, place.get("motion", 0.0))
     reflector, more_notes = add_reflector(config, scene, pose)
     notes += more_notes
+    if config.shells is not None:
+        trace_rules(config.shells, scene.object_names, reflector)
     mesh, part_names = scene.object_mesh(reflector), scene.object_part_names(reflector)
     positions = np.asarray(mesh.positions)
     triangles = np.asarray(mesh.triangles)

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from mirrorbake import _core
+from mirrorbake.scene.config_shells import Shells, ShellSection, check_shells
 from mirrorbake.scene.config_values import (
     AUTO,
     Extinction,
@@ -319,6 +320,9 @@ class SceneConfig(Section):
     light: Light | None = None
     """None: the light stays as it is."""
     layers: Layers = Layers()
+    shells: Annotated[Shells | None, BeforeValidator(as_tuple), *AUTO] = None
+    """[[shells]], front to back. "auto": `local`, the object itself, and the rest, with what else has a shape
+    of its own and pays."""
     maps: Maps = Maps()
     trace: Trace = Trace()
     infer: Infer = Infer()
@@ -343,6 +347,14 @@ class SceneConfig(Section):
             raise ValueError("reflector.scene_object needs surroundings.scene, the file that it is in")
         if self.reflector.scene_object is not None and self.motion is not None:
             raise ValueError("[motion] has no meaning for reflector.scene_object, which stays where it is")
+        if self.shells is not None:
+            check_shells(self.shells)
+            if self.layers.local is not None:
+                raise ValueError("layers.local has no meaning beside [[shells]]")
+            if self.maps.distant is not None and self.shells[-1].proxy != "auto":
+                raise ValueError(
+                    f"maps.distant and the proxy of {self.shells[-1].name!r} are one; give either"
+                )
         if self.light is not None and self.surroundings.panorama is None:
             raise ValueError("[light] needs surroundings.panorama, the light that it turns")
         return self
@@ -365,6 +377,7 @@ SECTIONS: Mapping[str, type[Section]] = {
     "motion": Motion,
     "light": Light,
     "layers": Layers,
+    "shells": ShellSection,
     "maps": Maps,
     "trace": Trace,
     "infer": Infer,

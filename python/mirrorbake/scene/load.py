@@ -44,7 +44,7 @@ def _describe(error: ErrorDetails) -> str:
 def _suggestion(keys: Sequence[str]) -> str:
     """Return words for the key that was probably meant; none if none is like it."""
     known: list[str] = list(SceneConfig.model_fields)
-    for key in keys[:-1]:
+    for key in (key for key in keys[:-1] if not key.isdigit()):
         section = SECTIONS.get(key)
         known = [] if section is None else list(section.model_fields)
     close = difflib.get_close_matches(keys[-1], known, n=1)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+from mirrorbake.scene.config_shells import ShellSection
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,6 +18,7 @@ DECIDED_KEYS = (
     "trace.depth",
     "trace.samples",
     "layers.diffuse",
+    "shells",
     "layers.local",
     "layers.hull_split",
     "maps.distant",
@@ -30,6 +33,10 @@ DECIDED_KEYS = (
 """Keys of a scene file that may be "auto", in the order in which they are decided."""
 
 
+DecisionValue: TypeAlias = bool | int | float | str | list[dict[str, Any]]
+"""Of a key of a scene file; the list of tables of `shells`."""
+
+
 @dataclass(frozen=True)
 class Decision:
     """The value of one key, and why."""
@@ -38,7 +45,7 @@ class Decision:
     """Of the scene file: one of `DECIDED_KEYS`."""
     part: str | None
     """The part of the reflector that it is about; None: all."""
-    value: bool | int | float | str
+    value: DecisionValue
     automatic: bool
     """False: the scene file sets the value."""
     reason: str
@@ -53,10 +60,30 @@ class Decision:
         'maps.size = 256  # set in the scene'
         >>> str(Decision("layers.local", "lid", True, True, "it reflects itself", 0.1))
         'layers.local = true  # lid: it reflects itself'
+        >>> str(Decision("shells", None, [{"name": "all"}], True, "it sees the sky alone", None))
+        'shells = [{ name = "all" }]  # it sees the sky alone'
         """
         part = f"{self.part}: " if self.part is not None else ""
-        # Booleans, integers and plain strings are the same in JSON and TOML.
-        return f"{self.key} = {json.dumps(self.value)}  # {part}{self.reason}"
+        return f"{self.key} = {_toml(self.value)}  # {part}{self.reason}"
+
+
+def _toml(value: DecisionValue) -> str:
+    # Booleans, numbers, plain strings and lists of these are the same in JSON and TOML.
+    if not isinstance(value, list):
+        return json.dumps(value)
+    tables = (", ".join(f"{key} = {json.dumps(entry)}" for key, entry in table.items()) for table in value)
+    return "[" + ", ".join(f"{{ {table} }}" for table in tables) + "]"
+
+
+@dataclass(frozen=True)
+class PlannedShell:
+    """A shell of a bake."""
+
+    name: str
+    proxy: dict[str, Any] | None
+    """As in a PEM's attributes; None: an ellipsoid about each part of the object."""
+    parts: tuple[str, ...]
+    """Parts of the reflector that have a map of it."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +92,13 @@ class Plan:
 
     decisions: tuple[Decision, ...]
     distant: dict[str, Any]
-    """Proxy of the distant layer, as in a PEM's attributes."""
+    """Proxy of the distant layer, the last shell, as in a PEM's attributes."""
+    shells: tuple[PlannedShell, ...] = ()
+    """Front to back."""
     advice: tuple[str, ...] = ()
     """What was measured of choices that are the user's: whether a PEM is worth it, and what would do."""
 
-    def value(self, key: str, part: str | None = None) -> bool | int | float | str:
+    def value(self, key: str, part: str | None = None) -> DecisionValue:
         """Return what was decided; KeyError for what was not."""
         for decision in self.decisions:
             if decision.key == key and decision.part in (None, part):
@@ -97,7 +126,7 @@ class Plan:
         return bool(self.value("layers.diffuse"))
 
     def has_local(self, part: str) -> bool:
-        """Whether a part of the reflector gets a local layer."""
+        """Whether a part of the reflector gets a map of what the object reflects of itself."""
         return bool(self.value("layers.local", part))
 
     def lines(self) -> list[str]:
@@ -108,6 +137,11 @@ class Plan:
     def has_hull_split(self) -> bool:
         """Whether local maps leave out the polygons on the convex hull."""
         return bool(self.value("layers.hull_split"))
+
+    @property
+    def shell_tables(self) -> list[dict[str, Any]]:
+        """The tables of [[shells]]."""
+        return cast("list[dict[str, Any]]", self.value("shells"))
 
     def resolve(self, config: SceneConfig) -> SceneConfig:
         """Return the scene with what the tracing of its views needs in place of "auto"."""
@@ -124,19 +158,30 @@ class Plan:
                 "views": resolved("views", "traced"),
                 "infer": resolved("infer", "passes", "neighbours"),
                 "static": resolved("static", "views"),
+                "shells": tuple(ShellSection.model_validate(table) for table in self.shell_tables),
             }
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
-        decisions = [asdict(decision) for decision in self.decisions]
-        return {"decisions": decisions, "distant": self.distant, "advice": list(self.advice)}
+        return {
+            "decisions": [asdict(decision) for decision in self.decisions],
+            "distant": self.distant,
+            "shells": [asdict(shell) | {"parts": list(shell.parts)} for shell in self.shells],
+            "advice": list(self.advice),
+        }
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Plan:
         """Inverse of `to_dict`. Raises KeyError or TypeError for what is not one."""
-        decisions = tuple(Decision(**decision) for decision in data["decisions"])
-        plan = Plan(decisions, data["distant"], tuple(data["advice"]))
+        plan = Plan(
+            tuple(Decision(**decision) for decision in data["decisions"]),
+            data["distant"],
+            tuple(
+                PlannedShell(shell["name"], shell["proxy"], tuple(shell["parts"])) for shell in data["shells"]
+            ),
+            tuple(data["advice"]),
+        )
         for key in DECIDED_KEYS:
             if all(decision.key != key for decision in plan.decisions):
                 raise KeyError(key)

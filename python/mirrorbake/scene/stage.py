@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from mirrorbake import _core
 from mirrorbake.scene.build import BuiltScene, build_scene
+from mirrorbake.scene.config_shells import DEFAULT_SHELLS
+from mirrorbake.scene.shell_rules import trace_rules
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,7 +44,15 @@ class Stage:
             seed=trace.seed,
             noise=trace.noise or 0.0,
             most_samples_per_pixel=max(trace.samples, trace.most_samples),
+            shells=self.shell_rules,
         )
+
+    @property
+    def shell_rules(self) -> list[_core.ShellRule]:
+        """Rules by which reflected light is split; those of [PEM] §4 before the scene is planned."""
+        built = self.built
+        shells = self.config.shells or DEFAULT_SHELLS
+        return trace_rules(shells, built.scene.object_names, built.reflector)
 
     def options_of(self, window: tuple[int, int, int, int]) -> _core.TraceOptions:
         """Options of a part of a view: x, y, width and height in pixels; of no size: the whole."""

@@ -22,8 +22,8 @@ struct FitShell {
       {};  ///< 0 for those that the shell leaves out; empty: it covers all
 };
 
-/// Front to back, in the order of the traced shells; the last is opaque, and holds what arrives from its own
-/// and all further traced shells.
+/// Front to back, in the order of the targets' stack of the part; the last is opaque, and holds what arrives
+/// from its own and all further shells.
 using FitPart = std::vector<FitShell>;
 
 /// A traced view, as the run time will look up its maps.

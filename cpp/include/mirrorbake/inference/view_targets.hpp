@@ -15,9 +15,14 @@ namespace mirrorbake {
 /// samples never has to be in memory at once.
 class ViewTargets {
  public:
+  /// For each part, front to back, the number of the traced shell that each of its own shells ends with: it
+  /// holds that one and those in front of it that no other shell of the part holds.
+  using Stacks = std::vector<std::vector<int>>;
+
   /// Of an image of width × height pixels, a reflector of `parts` parts, and as many shells as the samples
-  /// will have. Throws InvalidArgument for a number below 1.
-  ViewTargets(int width, int height, int parts, int shells);
+  /// will have. Without `stacks` the shells of every part are the traced ones. Throws InvalidArgument for a
+  /// number below 1, or stacks that are not one for each part, rise and end with the last shell.
+  ViewTargets(int width, int height, int parts, int shells, const Stacks& stacks = {});
 
   /// Adds samples with traced light, at most one trace of every pixel. (x, y): where their image's top left
   /// pixel lies in this one. Samples whose light is NaN or infinite count as not traced (`rejected`). Throws
@@ -40,7 +45,7 @@ class ViewTargets {
   /// Means over the samples that see the reflector: F times the incident light, and the body's own light D.
   glm::vec3 reflected(std::size_t pixel) const;
   glm::vec3 diffuse(std::size_t pixel) const;
-  /// Mean over the samples that see the part.
+  /// Mean over the samples that see the part; `shell` is a number in its stack.
   glm::vec4 shell(std::size_t pixel, int part, int shell) const;
   /// Mean of what arrives from this shell and all behind it: what a part's last shell has to show.
   glm::vec3 light_from(std::size_t pixel, int part, int shell) const;
@@ -59,6 +64,7 @@ class ViewTargets {
 
   int width_, height_, parts_, shells_;
   std::size_t rejected_ = 0;
+  std::vector<int> own_shell_;         // of parts × traced shells: the number in the part's stack
   std::vector<std::uint32_t> traced_;  // samples of a pixel, those beside the reflector included
   std::vector<std::uint32_t> counts_;
   std::vector<glm::dvec3> reflected_, diffuse_;

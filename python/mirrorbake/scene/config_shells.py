@@ -1,0 +1,83 @@
+"""[[shells]] of a scene file: what reflected rays meet, split front to back into maps of their own."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BeforeValidator, Field
+
+from mirrorbake import _core
+from mirrorbake.scene.config_values import Section, as_tuple
+
+ITSELF = "itself"
+"""Name of the reflector among the objects of a shell."""
+
+ShellShape: TypeAlias = Literal[
+    "auto",
+    "infinite",
+    "plane",
+    "sphere",
+    "hemisphere",
+    "box",
+    "ellipsoid",
+    "rotated box",
+    "rotated ellipsoid",
+]
+"""Geometry of a shell; "auto" fits what its rays meet, and an ellipsoid about each part for `itself`."""
+
+
+class ShellSection(Section):
+    """[[shells]]: one shell, nearer than those after it."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
+    """Letters, digits, `_` and `-`."""
+    objects: Annotated[
+        tuple[Annotated[str, Field(min_length=1, max_length=1000)], ...], BeforeValidator(as_tuple)
+    ] = ()
+    """Names of objects that it holds, `*` for any letters; `itself` is the reflector. None: all."""
+    nearer_than: Annotated[float, Field(gt=0, le=1e12)] | None = None
+    """Holds only what reflected rays meet within so many metres."""
+    proxy: ShellShape = "auto"
+
+    @property
+    def takes_rest(self) -> bool:
+        """Whether it holds whatever it gets."""
+        return not self.objects and self.nearer_than is None
+
+
+Shells: TypeAlias = tuple[ShellSection, ...]
+
+DEFAULT_SHELLS: Shells = (ShellSection(name="local", objects=(ITSELF,)), ShellSection(name="distant"))
+"""[PEM] §4: what the object reflects of itself, and the rest."""
+
+
+def check_shells(shells: Shells) -> None:
+    """Raise ValueError for a list of shells that is none."""
+    if not 1 <= len(shells) <= _core.MOST_SHELLS:
+        raise ValueError(f"shells: {len(shells)} of them; expected 1 to {_core.MOST_SHELLS}")
+    names = [shell.name for shell in shells]
+    for shell in shells[:-1]:
+        if names.count(shell.name) > 1:
+            raise ValueError(f"shells: two are named {shell.name!r}")
+        if shell.takes_rest:
+            raise ValueError(
+                f"shells: {shell.name!r} takes the rest, so that nothing is left for others; expected it last"
+            )
+    if not shells[-1].takes_rest:
+        raise ValueError(
+            f"shells: the last, {shells[-1].name!r}, holds some things alone; expected one that takes the "
+            "rest, without `objects` and `nearer_than`"
+        )
+    if shells[-1].proxy == "plane":
+        raise ValueError(
+            f"shells: the last, {shells[-1].name!r}, holds the background too, which is on no plane; "
+            "expected another proxy"
+        )
+    held: dict[str, str] = {}
+    for shell in shells:
+        for name in shell.objects:
+            if name in held:
+                raise ValueError(f"shells: {name!r} is in {held[name]!r} and again in {shell.name!r}")
+            # Within a distance only, what is further away is left for another.
+            if shell.nearer_than is None:
+                held[name] = shell.name

@@ -97,7 +97,12 @@ def scene(folder: Path, shells: Any = THREE, **changes: Any) -> dict[str, Any]:
     )
     mb.save_image(str(folder / "sky.exr"), sky.astype(np.float32), ["R", "G", "B"], format="float32")
     sections = {
-        "reflector": {"mesh": steps(folder), "height": 0.15, "rotation": [0.0, -25.0, 0.0]},
+        "reflector": {
+            "mesh": steps(folder),
+            "height": 0.15,
+            "rotation": [0.0, -25.0, 0.0],
+            "parts": "joined",
+        },
         "material": {},
         "surroundings": {"scene": tiles(folder), "panorama": str(folder / "sky.exr")},
         "views": {"count": 2, "degrees": 2.0, "start": 22.0, "size": [80, 60]},

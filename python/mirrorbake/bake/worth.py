@@ -64,7 +64,7 @@ def _disagreement(probe: Probe, proxy: _core.Proxy) -> tuple[float, float]:
     key = cell * parts + probe.part
     size = cells * (int(probe.view.max()) + 1) * parts
     count = np.bincount(key, minlength=size).reshape(-1, parts)
-    luminance = probe.distant @ np.array([0.2126, 0.7152, 0.0722])
+    luminance = probe.shells[-1][:, :3] @ np.array([0.2126, 0.7152, 0.0722])
     mean = np.bincount(key, luminance, size).reshape(-1, parts) / np.maximum(count, 1)
     square = np.bincount(key, luminance**2, size).reshape(-1, parts) / np.maximum(count, 1)
     # Of the mean of some samples.

@@ -325,8 +325,65 @@ export function shellNames(manifest: Manifest): string[] {
   return [...new Set(manifest.parts.flatMap((part) => part.shells.map((shell) => shell.name)))];
 }
 
+const FILTERS = ["nearest", "bilinear", "trilinear", "anisotropic"];
+const TYPES = ["uint16", "int16", "int32", "float16"];
+
+function checkRunTime(data: Manifest): void {
+  const { runTime, radiance } = data;
+  const isPlace = (place: unknown) =>
+    Array.isArray(place) && place.length === 2 && place.every(Number.isFinite);
+  const reads =
+    Array.isArray(runTime?.places) &&
+    runTime.places.length >= 1 &&
+    runTime.places.length <= 64 &&
+    runTime.places.every(isPlace) &&
+    runTime.footprintScale > 0 &&
+    FILTERS.includes(runTime.filter) &&
+    isIndex(runTime.maxTaps, 17);
+  if (!reads) damaged("it has no run-time model");
+  const coded =
+    [radiance?.low, radiance?.high, radiance?.epsilon].every(Number.isFinite) &&
+    radiance.high > radiance.low &&
+    radiance.high < 128 &&
+    radiance.epsilon > 0;
+  if (!coded) damaged("the code of radiance is not described");
+}
+
+function checkFiles(data: Manifest): void {
+  const { images, probe, poster, mesh, motion, notes, title } = data;
+  const suffixes = /^\.(avif|webp)$/;
+  if (!suffixes.test(images?.suffix) || typeof images.type !== "string")
+    damaged("its images are not described");
+  if (!isName(probe?.file) || !Array.isArray(probe.colours) || !probe.colours.every(isVector))
+    damaged("the probe is not described");
+  if (!isName(poster?.file) || typeof poster.type !== "string") damaged("the poster is not described");
+  const arrays = Object.values(mesh.arrays).every(
+    (array) =>
+      TYPES.includes(array?.type) &&
+      isIndex(array.components, 5) &&
+      isIndex(array.count, LARGEST_MESH) &&
+      isIndex(array.offset, LARGEST_MESH),
+  );
+  if (!arrays) damaged("the mesh is not described");
+  const moves =
+    motion === null || (isVector(motion?.to) && isVector(motion.pivot) && Number.isFinite(motion.turn));
+  if (!moves) damaged("the object's motion is not described");
+  if (!Array.isArray(notes) || typeof title !== "string") damaged("it has no title");
+}
+
 /// Parses and checks a manifest; throws UserError.
 export function parseManifest(text: string): Manifest {
+  try {
+    return checkedManifest(text);
+  } catch (failure) {
+    // What is not there at all, or not of the kind that it should be.
+    if (failure instanceof TypeError || failure instanceof RangeError)
+      return damaged("something in it is missing");
+    throw failure;
+  }
+}
+
+function checkedManifest(text: string): Manifest {
   let data: Manifest & { format?: string; version?: number };
   try {
     data = JSON.parse(text);
@@ -361,9 +418,8 @@ export function parseManifest(text: string): Manifest {
   if ((maps !== null && !areMaps(maps, data.maps)) || !fades) damaged("the static set is not described");
   checkMaterials(data);
   checkMesh(data);
-  if (!isName(data.probe?.file) || !isName(data.poster?.file)) damaged("the poster is not described");
-  if (!Array.isArray(data.runTime?.places) || data.runTime.places.length < 1)
-    damaged("it has no run-time model");
+  checkRunTime(data);
+  checkFiles(data);
   checkCamera(data);
   if (!(data.first >= 0 && data.first < data.samples.length)) data.first = 0;
   return data;

@@ -117,7 +117,7 @@ TEST_F(Obj, EveryDefectIsAFileErrorThatSaysWhatIsWrong) {
       {triangle + "f 1 2 0\n", "face 1 has the vertex index 0"},
       {triangle + "f 1 2 -4\n", "face 1 has the vertex index -4"},
       {triangle + "f 1 2 3\nf 1 x 3\n", "line 5 has 'x'"},
-      {triangle + "f 1 2\n", "line 4 has 2 corners"},
+      {triangle + "f 1 2\n", "has no triangles"},
       {triangle + "f 1/1/1/1 2 3\n", "line 4 has '1/1/1/1'"},
       {triangle + "f 1/1 2/1 3/1\n", "texture coordinate index 1, 0 are defined"},
       {triangle + "f 1//1 2//1 3//1\n", "normal index 1, 0 are defined"},

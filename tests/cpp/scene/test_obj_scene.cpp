@@ -253,10 +253,12 @@ TEST_F(ObjSceneFile, GroupsAreTheObjectsWhereNoneIsNamed) {
 }
 
 TEST_F(ObjSceneFile, WhatIsNoTriangleIsCountedAndColoursAreKept) {
-  const LoadedScene loaded = load_scene(write(
-      "v.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 1 1 0\nl 1 2\nl 2 3\np 1\ncurv 0 1 1 2 3\nf 1 2 3\n"));
+  const LoadedScene loaded = load_scene(
+      write("v.obj",
+            "v 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 1 1 0\nl 1 2\nl 2 3\np 1\ncurv 0 1 1 2 3\nf 1 2\nf 1 2 3\n"));
   EXPECT_THAT(messages(loaded), ElementsAre("lines are not supported x2", "points are not supported x1",
-                                            "curves and surfaces are not supported x1"));
+                                            "curves and surfaces are not supported x1",
+                                            "faces of fewer than three corners are left out x1"));
   const std::vector<glm::vec3>& colors = loaded.scene.objects.at(0).mesh.colors;
   ASSERT_EQ(colors.size(), 3U);
   EXPECT_EQ(colors[0], glm::vec3(1, 0, 0));

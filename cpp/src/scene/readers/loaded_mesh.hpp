@@ -32,8 +32,9 @@ struct ObjContent {
   std::vector<std::string> libraries;  ///< what follows each `mtllib`
   std::uint64_t lines = 0;
   std::uint64_t points = 0;
-  std::uint64_t curves = 0;  ///< and surfaces
-  std::uint64_t colors = 0;  ///< vertices that have one
+  std::uint64_t curves = 0;       ///< and surfaces
+  std::uint64_t short_faces = 0;  ///< of one or two corners
+  std::uint64_t colors = 0;       ///< vertices that have one
 };
 
 /// `origin` becomes the mesh's zero.

@@ -145,8 +145,10 @@ class ObjReader {
       if (!corner) fail("'" + std::string(token.substr(0, 40)) + "', expected the indices of a corner");
       corners_.push_back(*corner);
     }
+    // Exporters leave them behind where they have merged points.
     if (corners_.size() < 3) {
-      fail(std::to_string(corners_.size()) + " corners, expected 3 or more");
+      ++content_.short_faces;
+      return;
     }
     builder_.add_face(corners_);
   }

@@ -32,6 +32,7 @@ class ObjScene {
     warnings_.add("lines are not supported", used.lines);
     warnings_.add("points are not supported", used.points);
     warnings_.add("curves and surfaces are not supported", used.curves);
+    warnings_.add("faces of fewer than three corners are left out", used.short_faces);
     for (const std::string& library : used.libraries) read_library(library);
 
     std::map<int, int> material_of;

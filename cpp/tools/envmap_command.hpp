@@ -78,6 +78,18 @@ struct Output {
   }
 };
 
+/// Of --exposure, in stops: NaN passes the range of CLI11.
+inline CLI::Validator exposure_range() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        double stops = 0.0;
+        const bool number = CLI::detail::lexical_cast(text, stops);
+        return number && stops >= -20.0 && stops <= 20.0 ? std::string()
+                                                         : text + " is not within -20 to 20 stops";
+      },
+      "STOPS in [-20 - 20]");
+}
+
 struct Size {
   int width = 0;
   int height = 0;

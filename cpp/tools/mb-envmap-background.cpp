@@ -10,6 +10,7 @@
 
 #include "envmap_command.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/prefilter/background.hpp"
@@ -25,7 +26,7 @@ glm::dmat3 rotation_of(const char* option, const std::vector<double>& look, doub
   if (!std::isfinite(length) || !(length > 0.0)) {
     throw InvalidArgument(option, json_list(look), "three finite numbers that are not all 0");
   }
-  if (!std::isfinite(roll)) throw InvalidArgument("--roll", json_number(roll), "finite degrees");
+  if (!std::isfinite(roll)) throw InvalidArgument("--roll", text_of(roll), "finite degrees");
   const glm::dvec3 back = -given / length;
   const glm::dvec3 toward = std::abs(back.y) < 0.9999 ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, -back.y);
   const glm::dvec3 right = glm::normalize(glm::cross(toward, back));

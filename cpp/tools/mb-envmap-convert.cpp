@@ -11,6 +11,7 @@
 
 #include "envmap_command.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 
@@ -31,7 +32,9 @@ struct Conversion {
 
   CLI::Option* add_turn(CLI::App& app) {
     app.add_option("--axis", axis, "x y z of the axis of --turn")->expected(3)->capture_default_str();
-    app.add_option("--exposure", exposure, "stops by which radiance is raised")->capture_default_str();
+    app.add_option("--exposure", exposure, "stops by which radiance is raised")
+        ->capture_default_str()
+        ->check(exposure_range());
     return app
         .add_option("--turn", turn,
                     "degrees to turn the surroundings about the axis: about +Y from -Z towards +X")
@@ -70,6 +73,7 @@ struct Conversion {
     if (!std::isfinite(glm::length(given)) || !(glm::length(given) > 0.0F)) {
       throw InvalidArgument("--axis", json_list(axis), "three finite numbers that are not all 0");
     }
+    if (!std::isfinite(turn)) throw InvalidArgument("--turn", text_of(turn), "finite degrees");
     const glm::dvec3 a = glm::normalize(glm::dvec3(given));
     const double angle = glm::radians(static_cast<double>(turn));
     const glm::dmat3 cross(glm::dvec3(0, a.z, -a.y), glm::dvec3(-a.z, 0, a.x), glm::dvec3(a.y, -a.x, 0));

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -93,30 +94,41 @@ class Prefilter final : public Command {
         ->check(CLI::IsMember({"irradiance", "sh", "phong", "ggx", "table"}));
     app->add_option("--to", projection_, "projection to make, as for --from")->capture_default_str();
     app->add_option("--size", size_, "texels of a face, HEIGHT or WIDTHxHEIGHT")->capture_default_str();
-    app->add_option("--exponent", exponent_, "phong: 1 to 1e6")->capture_default_str();
-    app->add_option("--alpha", alpha_,
-                    "ggx: one lobe of this width, 0.01 to 1, instead of a chain of levels");
-    app->add_option("--levels", levels_, "ggx: levels of the chain, 0 down to 4 x 4 texels")
-        ->capture_default_str();
-    app->add_flag("--linear-roughness", linear_, "ggx: alpha rises with the level, not with its square");
-    app->add_option("--split-sum", split_sum_, "ggx: also write the table of the second sum to this image");
-    app->add_option("--table", table_, "table: file of weights at equal steps of the angle from 0");
-    app->add_option("--table-angle", table_angle_, "table: degrees of the last weight, up to 180")
-        ->capture_default_str();
-    app->add_option("--order", order_, "sh: highest band, 0 to 8")->capture_default_str();
-    app->add_option("--window", window_, "sh, against ringing: none, hanning or sloan")
-        ->capture_default_str();
-    app->add_flag("--keep-negative", keep_negative_, "sh: keep irradiance below 0 in images");
-    app->add_flag("--coefficients", coefficients_, "sh: write the coefficients as a row of an image");
+    only("phong", app->add_option("--exponent", exponent_, "phong: 1 to 1e6")->capture_default_str());
+    only("ggx", app->add_option("--alpha", alpha_,
+                                "ggx: one lobe of this width, 0.01 to 1, instead of a chain of levels"));
+    only("ggx", app->add_option("--levels", levels_, "ggx: levels of the chain, 0 down to 4 x 4 texels")
+                    ->capture_default_str());
+    only("ggx", app->add_flag("--linear-roughness", linear_,
+                              "ggx: alpha rises with the level, not with its square"));
+    only("ggx", app->add_option("--split-sum", split_sum_,
+                                "ggx: also write the table of the second sum to this image"));
+    only("table",
+         app->add_option("--table", table_, "table: file of weights at equal steps of the angle from 0"));
+    only("table",
+         app->add_option("--table-angle", table_angle_, "table: degrees of the last weight, up to 180")
+             ->capture_default_str());
+    only("sh", app->add_option("--order", order_, "sh: highest band, 0 to 8")->capture_default_str());
+    only("sh", app->add_option("--window", window_, "sh, against ringing: none, hanning or sloan")
+                   ->capture_default_str());
+    only("sh", app->add_flag("--keep-negative", keep_negative_, "sh: keep irradiance below 0 in images"));
+    only("sh",
+         app->add_flag("--coefficients", coefficients_, "sh: write the coefficients as a row of an image"));
     app->add_option("--scale", scale_,
                     "mean, which keeps white white, or sum over the lobe (default: sum for irradiance)")
         ->check(CLI::IsMember({"mean", "sum"}));
   }
 
   void run(bool json) const override {
+    for (const auto& [model, option] : only_) {
+      if (option->count() > 0 && model != model_) {
+        throw InvalidArgument(option->get_name(), "given with --model " + model_, "--model " + model);
+      }
+    }
+    if (!split_sum_.empty()) check_envmap_path(split_sum_, {ProjectionKind::angular});
     if (model_ == "sh") {
       run_harmonics(json);
-    } else if (model_ == "ggx" && alpha_ < 0.0) {
+    } else if (model_ == "ggx" && !alpha_) {
       run_chain(json);
     } else {
       run_lobe(json);
@@ -124,6 +136,17 @@ class Prefilter final : public Command {
   }
 
  private:
+  // Options of one model.
+  void only(const char* model, CLI::Option* option) { only_.emplace_back(model, option); }
+
+  EnvMap load() const {
+    EnvMap map = input_.load();
+    if (const std::size_t bad = count_not_finite(map); bad > 0) {
+      throw FileError(input_.path, "has " + std::to_string(bad) + " NaN or infinite values, expected none");
+    }
+    return map;
+  }
+
   void run_lobe(bool json) const {
     const PrefilterTarget target = target_of();
     output_.check(target.projection);
@@ -131,7 +154,7 @@ class Prefilter final : public Command {
     if (model_ == "phong") {
       lobe = {LobeKind::phong, exponent_};
     } else if (model_ == "ggx") {
-      lobe = {LobeKind::ggx, 1.0, alpha_};
+      lobe = {LobeKind::ggx, 1.0, *alpha_};
     } else if (model_ == "table") {
       if (table_.empty()) throw InvalidArgument("--table", "missing", "a file of weights");
       lobe.kind = LobeKind::table;
@@ -140,7 +163,7 @@ class Prefilter final : public Command {
     }
     validate(lobe);
     const bool sum = scale_ == "sum" || (scale_.empty() && model_ == "irradiance");
-    const EnvMap source = input_.load();
+    const EnvMap source = load();
     output_.save(Convolver(source).apply(lobe, target, sum ? LobeScale::sum : LobeScale::mean), json);
     write_split_sum();
   }
@@ -168,7 +191,7 @@ class Prefilter final : public Command {
       return one;
     };
     numbered(0).check({ProjectionKind::cube});
-    const EnvMap chain = ggx_chain(input_.load(), options);
+    const EnvMap chain = ggx_chain(load(), options);
     if (mark == std::string::npos) {
       output_.save(chain, json);
     } else {
@@ -188,7 +211,7 @@ class Prefilter final : public Command {
     const HarmonicWindow window = parse_harmonic_window(window_);
     const PrefilterTarget target = target_of();
     if (!as_json) output_.check(coefficients_ ? Projection{ProjectionKind::latlong} : target.projection);
-    const EnvMap source = input_.load();
+    const EnvMap source = load();
     const Harmonics light = project_harmonics(source, order_);
     if (as_json || coefficients_) {
       const Harmonics damped = windowed(light, window);
@@ -229,7 +252,7 @@ class Prefilter final : public Command {
   std::string projection_ = "cube";
   std::string size_ = "128";
   double exponent_ = 50.0;
-  double alpha_ = -1.0;
+  std::optional<double> alpha_;
   int levels_ = 0;
   bool linear_ = false;
   std::string split_sum_;
@@ -240,6 +263,7 @@ class Prefilter final : public Command {
   bool keep_negative_ = false;
   bool coefficients_ = false;
   std::string scale_;
+  std::vector<std::pair<std::string, CLI::Option*>> only_;
 };
 
 }  // namespace

@@ -39,7 +39,7 @@ class Preview final : public Command {
     app->add_option("--size", size_, "pixels of a face, HEIGHT or WIDTHxHEIGHT")->capture_default_str();
     app->add_option("--exposure", exposure_, "stops by which radiance is raised")
         ->capture_default_str()
-        ->check(CLI::Range(-20.0F, 20.0F));
+        ->check(exposure_range());
     app->add_option("--tone-map", tone_, "tone mapping: neutral, or none, which clips")
         ->capture_default_str()
         ->check(CLI::IsMember({"neutral", "none"}));

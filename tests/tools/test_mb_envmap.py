@@ -346,6 +346,22 @@ def test_a_fisheye_photograph_of_the_sky_is_brought_to_its_place(tmp_path: Path)
     np.testing.assert_allclose(seen, [[9, 0, 0], [0, 9, 0], [1, 1, 1], [0, 0, 0]], atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--turn", "nan"), "--turn is"),
+        (("--turn", 5, "--exposure", "nan"), "nan is not within -20 to 20 stops"),
+        (("--turn", 5, "--exposure", 99), "99 is not within -20 to 20 stops"),
+    ],
+)
+def test_turns_and_exposures_that_are_no_numbers_are_refused(
+    panorama: Path, tmp_path: Path, arguments: tuple[object, ...], expected: str
+) -> None:
+    out = tmp_path / "out.exr"
+    assert expected in mb_envmap("rotate", panorama, *arguments, "-o", out, status=2)
+    assert not out.exists()
+
+
 def test_backgrounds_are_those_of_the_library(tmp_path: Path) -> None:
     d = texel_directions("latlong", 128, 64)
     source = EnvMap.from_array((2 + np.sin(5 * d)).astype(np.float32), "latlong")

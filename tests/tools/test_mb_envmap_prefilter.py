@@ -110,3 +110,39 @@ def test_a_table_of_words_is_a_file_error(panorama: Path, tmp_path: Path) -> Non
 def test_progress_goes_to_stderr_and_figures_to_stdout(panorama: Path, tmp_path: Path) -> None:
     printed = run(panorama, "--model", "ggx", "--size", 8, "-o", tmp_path / "c.ktx2", "--json")
     assert json.loads(printed)["levels"] == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("irradiance", "--levels", 3), "--levels is given with --model irradiance, expected --model ggx"),
+        (("ggx", "--exponent", 3), "--exponent is given with --model ggx, expected --model phong"),
+        (("phong", "--coefficients"), "--coefficients is given with --model phong, expected --model sh"),
+        (("ggx", "--alpha", -0.5), "alpha is -0.5, expected 0.01 to 1"),
+        (("ggx", "--alpha", "nan"), "alpha is nan, expected 0.01 to 1"),
+    ],
+)
+def test_options_of_other_models_and_out_of_range_are_refused(
+    panorama: Path, tmp_path: Path, arguments: tuple[object, ...], expected: str
+) -> None:
+    out = tmp_path / "out.exr"
+    assert expected in run(panorama, "--size", 8, "-o", out, "--model", *arguments, status=2)
+    assert not out.exists()
+
+
+def test_files_that_are_no_good_are_named_before_the_work(panorama: Path, tmp_path: Path) -> None:
+    chain = ("--model", "ggx", "--size", 16, "-o", tmp_path / "chain.dds")
+    message = run(panorama, *chain, "--split-sum", tmp_path / "none" / "table.exr", status=3)
+    assert "none does not exist" in message
+    assert "level" not in message
+    values = np.ones((16, 32, 3), np.float32)
+    values[3, 4] = np.nan
+    EnvMap.from_array(values, "latlong").save(tmp_path / "nan.exr", format="float32")
+    assert "nan.exr: has 3 NaN or infinite values" in run(tmp_path / "nan.exr", *chain, status=3)
+
+
+def test_chain_goes_to_dds_as_half_floats(panorama: Path, tmp_path: Path) -> None:
+    run(panorama, "--model", "ggx", "--size", 16, "--levels", 3, "-o", tmp_path / "chain.dds")
+    loaded = EnvMap.load(tmp_path / "chain.dds")
+    expected = ggx_chain(EnvMap.load(panorama), 16, 3)
+    np.testing.assert_allclose(loaded.values, expected.values, rtol=2**-11)

@@ -217,6 +217,13 @@ TEST_F(ObjSceneFile, OddLinesOfALibraryAreWarnings) {
   EXPECT_THAT(outside.warnings.at(0).message, HasSubstr("'../other.mtl' is not inside"));
 }
 
+TEST_F(ObjSceneFile, AnImageOfAKindThatIsNotReadIsAWarning) {
+  write("paint.TGA", "pixels");
+  const LoadedScene loaded = load("newmtl red\nmap_Kd paint.TGA\nmap_d paint.TGA\n");
+  EXPECT_THAT(messages(loaded), ::testing::Contains(HasSubstr("'paint.TGA' is no EXR, HDR")));
+  EXPECT_EQ(loaded.scene.materials.at(0).albedo_texture.texture, -1);
+}
+
 TEST_F(ObjSceneFile, ADamagedImageIsAnError) {
   write("text.png", "no image");
   expect_error("newmtl red\nmap_Kd text.png\n", "text.png: is not an EXR");

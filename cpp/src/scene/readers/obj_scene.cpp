@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -19,6 +21,16 @@ namespace mirrorbake {
 namespace {
 
 namespace fs = std::filesystem;
+
+// Images that other programs read and we do not: the scene is worth loading without them.
+bool is_of_another_kind(const std::string& image) {
+  static const std::set<std::string> kOthers = {".bmp", ".dds", ".gif", ".ktx", ".ktx2",
+                                                ".pcx", ".psd", ".svg", ".tga"};
+  std::string suffix = fs::path(image).extension().string();
+  std::transform(suffix.begin(), suffix.end(), suffix.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return kOthers.contains(suffix);
+}
 
 class ObjScene {
  public:
@@ -71,6 +83,10 @@ class ObjScene {
     }
     if (!fs::exists(*target, code)) {
       warnings_.add("the " + what + " '" + reference + "' does not exist");
+      return std::nullopt;
+    }
+    if (is_of_another_kind(reference)) {
+      warnings_.add("the " + what + " '" + reference + "' is no EXR, HDR, TIFF, PNG, JPEG or WebP file");
       return std::nullopt;
     }
     return target;

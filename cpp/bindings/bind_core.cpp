@@ -40,8 +40,8 @@ void bind_core(nb::module_& m) {
   m.def("thread_count", &thread_count, "Number of threads that parallel loops use now.");
   nb::class_<ScopedLimit>(
       m, "ThreadLimit",
-      "The library uses at most `threads` threads, 0 to 1024 (0: all cores), to the end of a block\n"
-      "`with ThreadLimit(1): ...`, or else while the object lives. The smallest of several holds.")
+      R"(The library uses at most `threads` threads, 0 to 1024 (0: all cores), to the end of a block
+`with ThreadLimit(1): ...`, or else while the object lives. The smallest of several holds.)")
       .def(
           "__init__",
           [](ScopedLimit* self, int threads) {

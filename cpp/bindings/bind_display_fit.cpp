@@ -8,6 +8,7 @@
 
 #include "bind.hpp"
 #include "mirrorbake/inference/display_fit.hpp"
+#include "signature.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -29,18 +30,16 @@ struct OwnedDisplayView {
 void bind_targets(nb::module_& m) {
   nb::class_<ViewTargets>(
       m, "ViewTargets",
-      "What maps should make a view look like: sums over traced samples, pixel by pixel, so that "
-      "a view of many\nsamples never has to be in memory at once.")
+      R"(What maps should make a view look like: sums over traced samples, pixel by pixel, so that a view
+of many samples never has to be in memory at once.)")
       .def(nb::init<int, int, int, int, const ViewTargets::Stacks&>(), nb::arg("width"), nb::arg("height"),
            nb::arg("parts"), nb::arg("shells"), nb::arg("stacks") = ViewTargets::Stacks{},
-           "`stacks`: for each part, front to back, the number of the traced shell that each of its own "
-           "shells "
-           "ends\nwith; empty: the traced ones.")
+           R"(`stacks`: for each part, front to back, the number of the traced shell that each of its own
+shells ends with; empty: the traced ones.)")
       .def("add", &ViewTargets::add, nb::arg("samples"), nb::arg("x") = 0, nb::arg("y") = 0,
            nb::call_guard<nb::gil_scoped_release>(),
-           "Adds samples with traced light, at most one trace of every pixel; (x, y): where their image's "
-           "top left "
-           "pixel lies\nin this one.")
+           R"(Adds samples with traced light, at most one trace of every pixel; (x, y): where their
+image's top left pixel lies in this one.)")
       .def_prop_ro("width", &ViewTargets::width)
       .def_prop_ro("height", &ViewTargets::height)
       .def_prop_ro("parts", &ViewTargets::parts)
@@ -49,10 +48,7 @@ void bind_targets(nb::module_& m) {
                    "Samples that were left out so far, since their light is NaN or infinite.");
 }
 
-}  // namespace
-
-void bind_display_fit(nb::module_& m) {
-  bind_targets(m);
+void bind_fit_inputs(nb::module_& m) {
   nb::class_<OwnedFitShell>(m, "FitShell", "A shell as a part of the reflector sees it.")
       .def(
           "__init__",
@@ -60,9 +56,8 @@ void bind_display_fit(nb::module_& m) {
             new (self) OwnedFitShell{proxy, map, std::move(triangles)};
           },
           nb::arg("proxy"), nb::arg("map"), nb::arg("triangles") = nb::none(),
-          "map: number of its map, which several parts may share. triangles: uint8, 0 for each triangle of "
-          "the "
-          "reflector that\nthe shell leaves out, or None if it covers all.");
+          R"(map: number of its map, which several parts may share. triangles: uint8, 0 for each triangle
+of the reflector that the shell leaves out, or None if it covers all.)");
   nb::class_<OwnedDisplayView>(m, "DisplayView", "A traced view, as the run time will look up its maps.")
       .def(
           "__init__",
@@ -73,11 +68,11 @@ void bind_display_fit(nb::module_& m) {
           nb::arg("lookups"), nb::arg("targets"),
           nb::arg("nodes") = std::vector<std::pair<int, float>>{{0, 1.0F}}, nb::arg("weight") = 1.0F,
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
-          nb::sig("def __init__(self, lookups: SurfaceSamples, targets: ViewTargets, nodes: "
-                  "collections.abc.Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0) -> None"),
-          "lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at "
-          "RunTimeModel.places). "
-          "nodes:\nwhose maps are blended for the view, with their weights. weight: of its rows, >= 0.");
+          signature<R"(def __init__(self, lookups: SurfaceSamples, targets: ViewTargets,
+nodes: collections.abc.Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0) -> None)">(),
+          R"(lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at
+RunTimeModel.places). nodes: whose maps are blended for the view, with their weights. weight: of its
+rows, >= 0.)");
   nb::class_<DisplayFitOptions>(m, "DisplayFitOptions", "How maps are fitted to displayed pixels.")
       .def(
           "__init__",
@@ -96,6 +91,9 @@ void bind_display_fit(nb::module_& m) {
               "Below this radiance the derivative of the display's curve is held, in (0, 1].")
       .def_ro("passes", &DisplayFitOptions::passes,
               "How often the rows' weights are taken from the model's own image, 1 to 16.");
+}
+
+void bind_fit(nb::module_& m) {
   m.def(
       "fit_display",
       [](const std::vector<const OwnedDisplayView*>& views,
@@ -132,20 +130,26 @@ void bind_display_fit(nb::module_& m) {
       nb::arg("views"), nb::arg("parts"), nb::arg("maps"), nb::arg("nodes") = 1,
       nb::arg("run_time") = web_run_time(), nb::arg("options") = DisplayFitOptions{},
       nb::arg("prior") = nb::none(),
-      nb::sig(
-          "def fit_display(views: collections.abc.Sequence[DisplayView], parts: "
-          "collections.abc.Sequence[collections.abc.Sequence[FitShell]], maps: "
-          "collections.abc.Sequence[TexelTopology], nodes: int = 1, run_time: RunTimeModel = ..., options: "
-          "DisplayFitOptions = ..., prior: numpy.typing.NDArray[numpy.float32] | None = None) -> "
-          "tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport]]"),
-      "Infers the maps of all shells and parts, of one or several nodes, together, from the pixels that the "
-      "run time "
-      "will show.\n\nparts: the shells of each part, front to back, in the order of the traced shells; the "
-      "last is "
-      "opaque. prior: float32\n(nodes * texels, 3) or None. Returns the maps, float32 (nodes * texels, 4), "
-      "premultiplied radiance and alpha, those of\na node stacked in the order of `maps`; and reports of the "
-      "layers' "
-      "own fit, then of each pass.");
+      signature<R"(def fit_display(views: collections.abc.Sequence[DisplayView],
+parts: collections.abc.Sequence[collections.abc.Sequence[FitShell]],
+maps: collections.abc.Sequence[TexelTopology], nodes: int = 1, run_time: RunTimeModel = ...,
+options: DisplayFitOptions = ..., prior: numpy.typing.NDArray[numpy.float32] | None = None) ->
+tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport]])">(),
+      R"(Infers the maps of all shells and parts, of one or several nodes, together, from the pixels that
+the run time will show.
+
+parts: the shells of each part, front to back, in the order of the traced shells; the last is opaque.
+prior: float32 (nodes * texels, 3) or None. Returns the maps, float32 (nodes * texels, 4), premultiplied
+radiance and alpha, those of a node stacked in the order of `maps`; and reports of the layers' own fit,
+then of each pass.)");
+}
+
+}  // namespace
+
+void bind_display_fit(nb::module_& m) {
+  bind_targets(m);
+  bind_fit_inputs(m);
+  bind_fit(m);
 }
 
 }  // namespace mirrorbake::bindings

@@ -21,6 +21,7 @@
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/envmap/sampling.hpp"
+#include "signature.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -47,9 +48,7 @@ nb::ndarray<nb::numpy, float> block(std::vector<float>&& values) {
   return to_numpy(std::move(values), {size});
 }
 
-}  // namespace
-
-void bind_envmap(nb::module_& m) {
+void bind_layout(nb::module_& m) {
   nb::class_<EnvMapLayout> layout_type(
       m, "EnvMapLayout",
       "Order of the values of an environment map: levels, faces, rows, columns, channels.");
@@ -104,6 +103,9 @@ void bind_envmap(nb::module_& m) {
       },
       nb::arg("layout"), nb::arg("values"), nb::arg("level") = 0,
       "Sum of value times solid angle over the sphere, per channel.");
+}
+
+void bind_values(nb::module_& m) {
   m.def(
       "half_from_float",
       [](const EnvMapLayout& layout, FloatArray values) {
@@ -117,8 +119,8 @@ void bind_envmap(nb::module_& m) {
         return nb::make_tuple(to_numpy(std::move(half.values), {count}), clamped);
       },
       nb::arg("layout"), nb::arg("values"),
-      nb::sig("def half_from_float(layout: EnvMapLayout, values: NDArray[numpy.float32]) -> "
-              "tuple[NDArray[numpy.uint16], int]"),
+      signature<R"(def half_from_float(layout: EnvMapLayout, values: NDArray[numpy.float32]) ->
+tuple[NDArray[numpy.uint16], int])">(),
       "The bits of all values as IEEE 754 binary16, and how many were clamped to 65504.");
   nb::class_<Resampler>(m, "Resampler",
                         "Resamples maps of one layout, and keeps what every texel is made from.")
@@ -143,7 +145,9 @@ void bind_envmap(nb::module_& m) {
           "Writes the finest level of a map in the other projection and size into all of `result`.")
       .def("layout", &Resampler::layout, nb::arg("channels"), "Layout of the result for so many channels.")
       .def_prop_ro("bytes", &Resampler::bytes, "Memory of what is kept.");
+}
 
+void bind_levels(nb::module_& m) {
   m.def(
       "build_mips",
       [](const EnvMapLayout& layout, FloatArray values, MipFilter filter) {
@@ -163,8 +167,8 @@ void bind_envmap(nb::module_& m) {
         return nb::make_tuple(report.across, report.inside);
       },
       nb::arg("layout"), nb::arg("values"), nb::arg("level"),
-      nb::sig("def measure_seam(layout: EnvMapLayout, values: NDArray[numpy.float32], level: int) -> "
-              "tuple[float, float]"),
+      signature<R"(def measure_seam(layout: EnvMapLayout, values: NDArray[numpy.float32], level: int) ->
+tuple[float, float])">(),
       "Largest steps between neighbouring texels: across the edges of faces, and inside of faces.");
   m.def(
       "add_border",
@@ -204,8 +208,11 @@ void bind_envmap(nb::module_& m) {
       nb::arg("layout"), nb::arg("values"), nb::arg("directions"), nb::arg("ddx") = nb::none(),
       nb::arg("ddy") = nb::none(), nb::arg("filter") = SampleFilter::bilinear, nb::arg("level") = nb::none(),
       nb::arg("bias") = 0.0, nb::arg("max_anisotropy") = 16.0,
-      "Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials\n"
-      "(n, 3), or trilinear at levels, one or n of them.");
+      R"(Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with
+differentials (n, 3), or trilinear at levels, one or n of them.)");
+}
+
+void bind_sampling(nb::module_& m) {
   m.def(
       "quad_differentials",
       [](FloatImage directions) {
@@ -220,11 +227,10 @@ void bind_envmap(nb::module_& m) {
                            {reinterpret_cast<const glm::vec3*>(directions.data()), width * height}, ddx, ddy);
         return nb::make_tuple(vectors_to_numpy(std::move(ddx)), vectors_to_numpy(std::move(ddy)));
       },
-      nb::arg("directions"),
-      nb::sig("def quad_differentials(directions: NDArray[numpy.float32]) -> "
-              "tuple[NDArray[numpy.float32], NDArray[numpy.float32]]"),
-      "Differences within quads of 2x2 pixels of an image of directions (height, width, 3): two arrays\n"
-      "(height * width, 3).");
+      nb::arg("directions"), signature<R"(def quad_differentials(directions: NDArray[numpy.float32]) ->
+tuple[NDArray[numpy.float32], NDArray[numpy.float32]])">(),
+      R"(Differences within quads of 2x2 pixels of an image of directions (height, width, 3): two arrays
+(height * width, 3).)");
   m.def(
       "footprint_from_corners",
       [](glm::vec3 top_left, glm::vec3 top_right, glm::vec3 bottom_right, glm::vec3 bottom_left) {
@@ -255,31 +261,33 @@ void bind_envmap(nb::module_& m) {
         return nb::make_tuple(map.layout, block(std::move(map.values)), map.channels);
       },
       nb::arg("path"), nb::arg("projection") = nb::none(), nb::arg("faces") = FaceLayout::automatic,
-      nb::sig("def load_envmap(path: str | os.PathLike[str], projection: str | None = None, "
-              "faces: typing.Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', "
-              "'files'] = 'automatic') -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]"),
+      signature<R"(def load_envmap(path: str | os.PathLike[str], projection: str | None = None,
+faces: typing.Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic') ->
+tuple[EnvMapLayout, NDArray[numpy.float32], list[str]])">(),
       "Layout, values and names of the channels of a map in an image, KTX2 or DDS file.");
+}
+
+void bind_files(nb::module_& m) {
   m.def(
       "load_panorama",
       [](const PathText& path, const std::string& layer, const std::string& part) {
-        Image image;
+        Panorama panorama;
         {
           nb::gil_scoped_release released;
-          image = load_panorama(path.text, {part, layer});
+          panorama = load_panorama(path.text, {part, layer});
         }
-        const auto height = static_cast<std::size_t>(image.height);
-        const auto width = static_cast<std::size_t>(image.width);
-        return to_numpy(std::move(image.pixels), {height, width, 3});
+        const auto height = static_cast<std::size_t>(panorama.image.height);
+        const auto width = static_cast<std::size_t>(panorama.image.width);
+        return nb::make_tuple(to_numpy(std::move(panorama.image.pixels), {height, width, 3}),
+                              panorama.negative);
       },
       nb::arg("path"), nb::arg("layer") = "", nb::arg("part") = "",
-      nb::sig("def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') -> "
-              "NDArray[numpy.float32]"),
-      "A map as light: a latlong of R, G and B, (height, width, 3). Cubes are recognised by their shape and "
-      "resampled;\n"
-      "alpha, depth and other channels are left out. `layer` and `part` choose in an EXR file. Raises "
-      "FileError "
-      "for\n"
-      "a picture that is no panorama.");
+      signature<R"(def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') ->
+tuple[NDArray[numpy.float32], int])">(),
+      R"(A map as light: a latlong of R, G and B, (height, width, 3), finite and nowhere below 0; and how
+many values were negative in the file. Cubes are recognised by their shape and resampled; alpha, depth
+and other channels are left out. `layer` and `part` choose in an EXR file. Raises FileError for a picture
+that is no panorama, and for values that are not finite.)");
   m.def(
       "save_envmap",
       [](const PathText& path, const EnvMapLayout& layout, FloatArray values,
@@ -302,7 +310,9 @@ void bind_envmap(nb::module_& m) {
       },
       nb::arg("path"), nb::arg("layout"), nb::arg("blocks"),
       "Write encoded blocks of a cube: all levels of a face, one face after the other.");
+}
 
+void bind_comparison(nb::module_& m) {
   nb::class_<Comparison> comparison(m, "Comparison", "How two maps differ, texels weighted by solid angle.");
   comparison.def_ro("max_error", &Comparison::max_error, "Largest difference.")
       .def_ro("mean_error", &Comparison::mean_error, "Mean difference over the sphere.")
@@ -323,6 +333,17 @@ void bind_envmap(nb::module_& m) {
       },
       nb::arg("layout"), nb::arg("values"), nb::arg("reference_layout"), nb::arg("reference"),
       "The finest level of a map against a reference.");
+}
+
+}  // namespace
+
+void bind_envmap(nb::module_& m) {
+  bind_layout(m);
+  bind_values(m);
+  bind_levels(m);
+  bind_sampling(m);
+  bind_files(m);
+  bind_comparison(m);
 }
 
 }  // namespace mirrorbake::bindings

@@ -38,9 +38,8 @@ void bind_image(nb::module_& m) {
       },
       nb::arg("path"),
       nb::sig("def load_image(path: str | os.PathLike[str]) -> tuple[NDArray[numpy.float32], list[str]]"),
-      "Read an EXR, HDR, TIFF, PNG or JPEG as scene-linear float32 of shape (height, width, channels), with "
-      "the\n"
-      "names of the channels. Integer formats are decoded from sRGB. Raises FileError.");
+      R"(Read an EXR, HDR, TIFF, PNG or JPEG as scene-linear float32 of shape (height, width, channels),
+with the names of the channels. Integer formats are decoded from sRGB. Raises FileError.)");
 
   m.def(
       "save_image",
@@ -53,11 +52,9 @@ void bind_image(nb::module_& m) {
       },
       nb::arg("path"), nb::arg("pixels"), nb::arg("channels") = nb::none(),
       nb::arg("format") = PixelFormat::automatic,
-      "Write scene-linear pixels of shape (height, width, channels) atomically; the extension of the path "
-      "decides the\n"
-      "format. `channels` names the channels (default Y, YA, RGB or RGBA). `format`: automatic, half, "
-      "float32, uint8\n"
-      "or uint16. Raises FileError and InvalidArgument.");
+      R"(Write scene-linear pixels of shape (height, width, channels) atomically; the extension of the
+path decides the format. `channels` names the channels (default Y, YA, RGB or RGBA). `format`: automatic,
+half, float32, uint8 or uint16. Raises FileError and InvalidArgument.)");
 }
 
 }  // namespace mirrorbake::bindings

@@ -9,6 +9,7 @@
 #include "mirrorbake/envmap/texel_topology.hpp"
 #include "mirrorbake/inference/map_solver.hpp"
 #include "mirrorbake/inference/rendering_matrix.hpp"
+#include "signature.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -28,13 +29,11 @@ SampleSelection select(int part, const std::optional<ByteArray>& triangles) {
   return {part, {triangles->data(), triangles->size()}};
 }
 
-}  // namespace
-
-void bind_inference(nb::module_& m) {
+void bind_topology(nb::module_& m) {
   nb::class_<CubePyramidLayout>(
       m, "CubePyramidLayout",
-      "Order of the texels of a cube map with all its mip levels: the finest level first, in a "
-      "level the six faces (+X -X +Y -Y +Z -Z), in a face the rows from the top.")
+      R"(Order of the texels of a cube map with all its mip levels: the finest level first, in a level
+the six faces (+X -X +Y -Y +Z -Z), in a face the rows from the top.)")
       .def(
           "__init__",
           [](CubePyramidLayout* self, int size) {
@@ -62,14 +61,14 @@ void bind_inference(nb::module_& m) {
         return to_numpy(std::move(pyramid), {layout.texels(), static_cast<std::size_t>(channels)});
       },
       nb::arg("faces"),
-      "All levels of a cube map.\n\nfaces: float32 (6, N, N, C). Returns float32 (texels, C): every level is "
-      "the mean of the "
-      "finer one's 2x2 texels weighted by their solid angles ([EMT] section 2.4).");
+      R"(All levels of a cube map.
+
+faces: float32 (6, N, N, C). Returns float32 (texels, C): every level is the mean of the finer one's 2x2
+texels weighted by their solid angles ([EMT] section 2.4).)");
 
   nb::class_<TexelTopology>(m, "TexelTopology",
-                            "How the texels of a map with mip levels lie to each other. Numbered as the "
-                            "values of an EnvMap are: levels "
-                            "from the\nfinest, in a level the faces, in a face the rows from the top.")
+                            R"(How the texels of a map with mip levels lie to each other. Numbered as the
+values of an EnvMap are: levels from the finest, in a level the faces, in a face the rows from the top.)")
       .def(nb::init_implicit<const CubePyramidLayout&>())
       .def_static("cube", &TexelTopology::cube, nb::arg("size"), "Six faces; a power of two, 1 to 16384.")
       .def_static("dual_paraboloid", &TexelTopology::dual_paraboloid, nb::arg("size"),
@@ -86,7 +85,9 @@ void bind_inference(nb::module_& m) {
           "__eq__", [](const TexelTopology& a, const TexelTopology& b) { return a == b; }, nb::is_operator(),
           nb::sig("def __eq__(self, other: object, /) -> bool"));
   nb::implicitly_convertible<CubePyramidLayout, TexelTopology>();
+}
 
+void bind_matrix(nb::module_& m) {
   nb::class_<RenderingMatrix>(
       m, "RenderingMatrix",
       "Sparse matrix A of b = A x: one row per pixel, one column per texel of every mip level.")
@@ -145,7 +146,9 @@ void bind_inference(nb::module_& m) {
             return to_numpy(std::move(b), {self.rows(), x.shape(1)});
           },
           nb::arg("x"), "b = A x for x float32 (columns, C): float32 (rows, C).");
+}
 
+void bind_matrix_uses(nb::module_& m) {
   m.def(
       "build_rendering_matrix",
       [](const SurfaceSamples& samples, int part, const Proxy& proxy, const TexelTopology& topology,
@@ -156,14 +159,11 @@ void bind_inference(nb::module_& m) {
       },
       nb::arg("samples"), nb::arg("part"), nb::arg("proxy"), nb::arg("topology"),
       nb::arg("run_time") = reference_run_time(), nb::arg("triangles") = nb::none(),
-      nb::sig("def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, topology: "
-              "TexelTopology | "
-              "CubePyramidLayout, run_time: RunTimeModel = ..., triangles: numpy.typing.NDArray[numpy.uint8] "
-              "| None "
-              "= None) -> RenderingMatrix"),
-      "Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups. "
-      "`triangles`: uint8,\n0 for each triangle of the reflector whose samples are left out; None: all "
-      "count.");
+      signature<R"(def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy,
+topology: TexelTopology | CubePyramidLayout, run_time: RunTimeModel = ...,
+triangles: numpy.typing.NDArray[numpy.uint8] | None = None) -> RenderingMatrix)">(),
+      R"(Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups.
+`triangles`: uint8, 0 for each triangle of the reflector whose samples are left out; None: all count.)");
 
   m.def(
       "display_row_weights",
@@ -175,9 +175,11 @@ void bind_inference(nb::module_& m) {
       },
       nb::arg("matrix"), nb::arg("samples_per_pixel"), nb::arg("target"),
       nb::arg("pixel_samples") = std::vector<std::uint32_t>{},
-      "Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2, float32 "
-      "(rows, C).\n`pixel_samples` as SurfaceSamples has it stands in for samples_per_pixel.");
+      R"(Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2,
+float32 (rows, C). `pixel_samples` as SurfaceSamples has it stands in for samples_per_pixel.)");
+}
 
+void bind_solver_options(nb::module_& m) {
   nb::class_<SolveOptions> solve_options(m, "SolveOptions", "Weights of the regulariser and when to stop.");
   solve_options
       .def(
@@ -211,12 +213,13 @@ void bind_inference(nb::module_& m) {
       .def_ro("unknowns", &SolveReport::unknowns, "Texels that some row sees.")
       .def_ro("rms_error", &SolveReport::rms_error, "Weighted root mean square of A x - b.");
   show(solve_report, {"iterations", "rounds", "converged", "relative_gradient", "unknowns", "rms_error"});
+}
 
+void bind_solver(nb::module_& m) {
   using Nodes = std::vector<std::pair<int, float>>;
   nb::class_<MapSolver>(m, "MapSolver",
-                        "Regularised least squares for the maps of one or several nodes, seen by one or "
-                        "several views ([PEM] section "
-                        "4): what\nall solves share is computed once.")
+                        R"(Regularised least squares for the maps of one or several nodes, seen by one or
+several views ([PEM] section 4): what all solves share is computed once.)")
       .def(
           "__init__",
           [](MapSolver* self, const std::vector<std::pair<const RenderingMatrix*, Nodes>>& views,
@@ -230,15 +233,12 @@ void bind_inference(nb::module_& m) {
             new (self) MapSolver(solver_views, maps, nodes, options);
           },
           nb::arg("views"), nb::arg("maps"), nb::arg("nodes") = 1, nb::arg("options") = SolveOptions{},
-          nb::keep_alive<1, 2>(),
-          nb::sig("def __init__(self, views: collections.abc.Sequence[tuple[RenderingMatrix, "
-                  "collections.abc.Sequence[tuple[int, float]]]], maps: "
-                  "collections.abc.Sequence[TexelTopology | CubePyramidLayout], nodes: int = 1, options: "
-                  "SolveOptions "
-                  "= ...) -> None"),
-          "views: matrices, each with the nodes whose maps it sees and their weights in the blend: [(0, "
-          "1.0)] for the "
-          "only\none. maps: those of a node, stacked as the columns are.")
+          nb::keep_alive<1, 2>(), signature<R"(def __init__(self,
+views: collections.abc.Sequence[tuple[RenderingMatrix, collections.abc.Sequence[tuple[int, float]]]],
+maps: collections.abc.Sequence[TexelTopology | CubePyramidLayout], nodes: int = 1,
+options: SolveOptions = ...) -> None)">(),
+          R"(views: matrices, each with the nodes whose maps it sees and their weights in the blend: [(0,
+1.0)] for the only one. maps: those of a node, stacked as the columns are.)")
       .def(
           "solve",
           [](const MapSolver& self, const std::vector<Matrix>& targets,
@@ -265,17 +265,27 @@ void bind_inference(nb::module_& m) {
             return nb::make_tuple(to_numpy(std::move(solution.texels), {texels, channels}), solution.report);
           },
           nb::arg("targets"), nb::arg("row_weights"), nb::arg("prior") = nb::none(),
-          nb::arg("initial") = nb::none(),
-          nb::sig("def solve(self, targets: collections.abc.Sequence[numpy.typing.NDArray[numpy.float32]], "
-                  "row_weights: collections.abc.Sequence[numpy.typing.NDArray[numpy.float32]], prior: "
-                  "numpy.typing.NDArray[numpy.float32] | None = None, initial: "
-                  "numpy.typing.NDArray[numpy.float32] | None = None) -> "
-                  "tuple[numpy.typing.NDArray[numpy.float32], SolveReport]"),
-          "Solves for the maps.\n\ntargets, row_weights: of each view, float32 (rows, C), 1 to 4 channels, "
-          "the "
-          "fourth is coverage. prior, initial:\nfloat32 (nodes * texels, C). Returns the maps, float32 "
-          "(nodes * "
-          "texels, C), within [0, inf) (coverage in [0, 1]),\nand a report.");
+          nb::arg("initial") = nb::none(), signature<R"(def solve(self,
+targets: collections.abc.Sequence[numpy.typing.NDArray[numpy.float32]],
+row_weights: collections.abc.Sequence[numpy.typing.NDArray[numpy.float32]],
+prior: numpy.typing.NDArray[numpy.float32] | None = None,
+initial: numpy.typing.NDArray[numpy.float32] | None = None) ->
+tuple[numpy.typing.NDArray[numpy.float32], SolveReport])">(),
+          R"(Solves for the maps.
+
+targets, row_weights: of each view, float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior,
+initial: float32 (nodes * texels, C). Returns the maps, float32 (nodes * texels, C), within [0, inf)
+(coverage in [0, 1]), and a report.)");
+}
+
+}  // namespace
+
+void bind_inference(nb::module_& m) {
+  bind_topology(m);
+  bind_matrix(m);
+  bind_matrix_uses(m);
+  bind_solver_options(m);
+  bind_solver(m);
 }
 
 }  // namespace mirrorbake::bindings

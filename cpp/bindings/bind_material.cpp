@@ -17,10 +17,9 @@ void bind_texture(nb::module_& m) {
         "Bound the cache of all texture files together; 1 GiB until it is set, at least 16 MiB.");
   nb::class_<TextureReference> texture_reference(
       m, "TextureReference",
-      "A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of\n"
-      "KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation` "
-      "radians\n"
-      "about (0, 0), then moved.");
+      R"(A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as
+of KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation`
+radians about (0, 0), then moved.)");
   texture_reference
       .def(
           "__init__",
@@ -43,7 +42,9 @@ void bind_texture(nb::module_& m) {
   record(texture_reference, {"texture", "offset", "scale", "rotation"});
 }
 
-void bind_surface_material(nb::module_& m) {
+namespace {
+
+void bind_fresnel(nb::module_& m) {
   nb::class_<Fresnel> reflectance(m, "Fresnel", "Reflectance per colour channel as a function of the angle.");
   reflectance
       .def(
@@ -59,7 +60,9 @@ void bind_surface_material(nb::module_& m) {
       .def_rw("eta", &Fresnel::eta, "dielectric, conductor: real part of the relative index, above 0")
       .def_rw("k", &Fresnel::k, "conductor: extinction coefficient, at least 0");
   record(reflectance, {"model", "r0", "eta", "k"});
+}
 
+void bind_material(nb::module_& m) {
   nb::class_<Material> material(m, "Material", "What a surface does with light.");
   material
       .def(
@@ -129,6 +132,13 @@ void bind_surface_material(nb::module_& m) {
          {"name", "albedo", "albedo_texture", "specular", "fresnel", "specular_texture", "lobe", "roughness",
           "roughness_texture", "exponent", "layers", "emission", "emission_texture", "opacity",
           "opacity_texture", "opacity_cutoff", "normal_texture", "normal_scale", "colors_tint_reflectance"});
+}
+
+}  // namespace
+
+void bind_surface_material(nb::module_& m) {
+  bind_fresnel(m);
+  bind_material(m);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "bind.hpp"
 #include "mirrorbake/pem/render.hpp"
+#include "signature.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -23,9 +24,7 @@ struct OwnedShellMap {
   }
 };
 
-}  // namespace
-
-void bind_pem(nb::module_& m) {
+void bind_shell_map(nb::module_& m) {
   nb::class_<OwnedShellMap>(m, "ShellMap", "The map of one shell, as a part of the reflector reads it.")
       .def(
           "__init__",
@@ -34,13 +33,11 @@ void bind_pem(nb::module_& m) {
             new (self) OwnedShellMap{proxy, topology, std::move(texels), std::move(triangles)};
           },
           nb::arg("proxy"), nb::arg("topology"), nb::arg("texels"), nb::arg("triangles") = nb::none(),
-          nb::sig("def __init__(self, proxy: Proxy, topology: TexelTopology | CubePyramidLayout, texels: "
-                  "numpy.typing.NDArray[numpy.float32], triangles: numpy.typing.NDArray[numpy.uint8] | None "
-                  "= None) "
-                  "-> None"),
-          "texels: float32 (texels, 4), premultiplied RGBA, or (texels, 3), opaque. triangles: uint8, 0 for "
-          "each "
-          "triangle of\nthe reflector that the shell leaves out, or None if it covers all.")
+          signature<R"(def __init__(self, proxy: Proxy, topology: TexelTopology | CubePyramidLayout,
+texels: numpy.typing.NDArray[numpy.float32],
+triangles: numpy.typing.NDArray[numpy.uint8] | None = None) -> None)">(),
+          R"(texels: float32 (texels, 4), premultiplied RGBA, or (texels, 3), opaque. triangles: uint8, 0
+for each triangle of the reflector that the shell leaves out, or None if it covers all.)")
       .def_ro("proxy", &OwnedShellMap::proxy)
       .def_ro("topology", &OwnedShellMap::topology)
       .def_prop_ro(
@@ -60,7 +57,9 @@ void bind_pem(nb::module_& m) {
             return nb::ndarray<nb::numpy, const std::uint8_t>(map.triangles->data(), 1, shape, self);
           },
           "uint8, 0 for those that the shell leaves out, read-only; None: it covers all.");
+}
 
+void bind_rendering(nb::module_& m) {
   m.def(
       "render_reflector",
       [](const SurfaceSamples& samples, const std::vector<std::vector<const OwnedShellMap*>>& parts,
@@ -81,15 +80,15 @@ void bind_pem(nb::module_& m) {
                         {static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width), 4});
       },
       nb::arg("samples"), nb::arg("parts"), nb::arg("diffuse") = nb::none(),
-      nb::arg("run_time") = reference_run_time(),
-      nb::sig("def render_reflector(samples: SurfaceSamples, parts: "
-              "collections.abc.Sequence[collections.abc.Sequence[ShellMap]], diffuse: "
-              "numpy.typing.NDArray[numpy.float32] | None = None, run_time: RunTimeModel = ...) -> "
-              "numpy.typing.NDArray[numpy.float32]"),
-      "Draws the reflector from its maps: (L0 + (1 - a0)(L1 + ...)) F + D per sample, averaged over the "
-      "pixel.\n\nparts: the shells of each part, front to back. diffuse: float32 (len(samples), 3) or None "
-      "for "
-      "black.\nReturns float32 (H, W, 4): light times coverage, and coverage.");
+      nb::arg("run_time") = reference_run_time(), signature<R"(def render_reflector(samples: SurfaceSamples,
+parts: collections.abc.Sequence[collections.abc.Sequence[ShellMap]],
+diffuse: numpy.typing.NDArray[numpy.float32] | None = None, run_time: RunTimeModel = ...) ->
+numpy.typing.NDArray[numpy.float32])">(),
+      R"(Draws the reflector from its maps: (L0 + (1 - a0)(L1 + ...)) F + D per sample, averaged over the
+pixel.
+
+parts: the shells of each part, front to back. diffuse: float32 (len(samples), 3) or None for black.
+Returns float32 (H, W, 4): light times coverage, and coverage.)");
 
   m.def(
       "shell_light",
@@ -102,10 +101,10 @@ void bind_pem(nb::module_& m) {
         return vectors_to_numpy(std::move(light));
       },
       nb::arg("samples"), nb::arg("map"), nb::arg("run_time") = reference_run_time(),
-      nb::sig("def shell_light(samples: SurfaceSamples, map: ShellMap, run_time: RunTimeModel = ...) -> "
-              "numpy.typing.NDArray[numpy.float32]"),
-      "What every sample reads of one shell's map, float32 (len(samples), 4): premultiplied light, not yet "
-      "times F, and\nalpha, which is 0 where the shell leaves the sample's triangle out.");
+      signature<R"(def shell_light(samples: SurfaceSamples, map: ShellMap, run_time: RunTimeModel = ...) ->
+numpy.typing.NDArray[numpy.float32])">(),
+      R"(What every sample reads of one shell's map, float32 (len(samples), 4): premultiplied light, not
+yet times F, and alpha, which is 0 where the shell leaves the sample's triangle out.)");
 
   m.def(
       "diffuse_from_irradiance",
@@ -122,8 +121,15 @@ void bind_pem(nb::module_& m) {
         return vectors_to_numpy(std::move(diffuse));
       },
       nb::arg("samples"), nb::arg("triangles"), nb::arg("vertex_irradiance"),
-      "Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex (V, "
-      "3).");
+      R"(Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex
+(V, 3).)");
+}
+
+}  // namespace
+
+void bind_pem(nb::module_& m) {
+  bind_shell_map(m);
+  bind_rendering(m);
 }
 
 }  // namespace mirrorbake::bindings

@@ -18,6 +18,7 @@
 #include "mirrorbake/prefilter/harmonics.hpp"
 #include "mirrorbake/prefilter/lobe.hpp"
 #include "mirrorbake/prefilter/split_sum.hpp"
+#include "signature.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -71,9 +72,7 @@ nb::ndarray<nb::numpy, float> block(std::vector<float>&& values) {
   return to_numpy(std::move(values), {size});
 }
 
-}  // namespace
-
-void bind_prefilter(nb::module_& m) {
+void bind_lobes(nb::module_& m) {
   nb::class_<Lobe>(m, "Lobe", "A radially symmetric lobe of weights.")
       .def(
           "__init__",
@@ -107,9 +106,8 @@ void bind_prefilter(nb::module_& m) {
             return nb::make_tuple(map.layout, block(std::move(map.values)));
           },
           nb::arg("lobe"), nb::arg("projection"), nb::arg("width"), nb::arg("height"), nb::arg("scale"),
-          nb::sig("def apply(self, lobe: Lobe, projection: str, width: int, height: int, "
-                  "scale: typing.Literal['mean', 'sum']) -> "
-                  "tuple[EnvMapLayout, NDArray[numpy.float32]]"),
+          signature<R"(def apply(self, lobe: Lobe, projection: str, width: int, height: int,
+scale: typing.Literal['mean', 'sum']) -> tuple[EnvMapLayout, NDArray[numpy.float32]])">(),
           "Layout and values of the map, by the direction of the lobe's axis.")
       .def(
           "sample",
@@ -126,6 +124,9 @@ void bind_prefilter(nb::module_& m) {
           },
           nb::arg("lobe"), nb::arg("directions"), nb::arg("scale"), nb::arg("channels"),
           "Values (n, channels) for lobes about unit directions (n, 3).");
+}
+
+void bind_chain(nb::module_& m) {
   m.def(
       "ggx_chain",
       [](const EnvMapLayout& layout, FloatArray values, int size, int levels, RoughnessScale roughness,
@@ -146,14 +147,16 @@ void bind_prefilter(nb::module_& m) {
       },
       nb::arg("layout"), nb::arg("values"), nb::arg("size"), nb::arg("levels"), nb::arg("roughness"),
       nb::arg("progress").none() = nb::none(),
-      nb::sig("def ggx_chain(layout: EnvMapLayout, values: NDArray[numpy.float32], size: int, levels: int, "
-              "roughness: typing.Literal['squared', 'linear'], progress: collections.abc.Callable[[int, "
-              "int], None] | None = None) -> "
-              "tuple[EnvMapLayout, NDArray[numpy.float32]]"),
+      signature<R"(def ggx_chain(layout: EnvMapLayout, values: NDArray[numpy.float32], size: int,
+levels: int, roughness: typing.Literal['squared', 'linear'],
+progress: collections.abc.Callable[[int, int], None] | None = None) -> tuple[EnvMapLayout,
+NDArray[numpy.float32]])">(),
       "A cube whose levels are prefiltered with GGX of rising alpha.");
   m.def("chain_alpha", &chain_alpha, nb::arg("level"), nb::arg("levels"), nb::arg("roughness"),
         "Alpha of a level of a chain.");
+}
 
+void bind_harmonics(nb::module_& m) {
   m.def(
       "project_harmonics",
       [](const EnvMapLayout& layout, FloatArray values, int order) {
@@ -205,9 +208,8 @@ void bind_prefilter(nb::module_& m) {
       },
       nb::arg("coefficients"), nb::arg("projection"), nb::arg("width"), nb::arg("height"),
       nb::arg("negative"),
-      nb::sig("def evaluate_harmonics(coefficients: NDArray[numpy.float64], projection: str, width: int, "
-              "height: int, negative: typing.Literal['clamp', 'keep']) -> tuple[EnvMapLayout, "
-              "NDArray[numpy.float32]]"),
+      signature<R"(def evaluate_harmonics(coefficients: NDArray[numpy.float64], projection: str, width: int,
+height: int, negative: typing.Literal['clamp', 'keep']) -> tuple[EnvMapLayout, NDArray[numpy.float32]])">(),
       "Layout and values of the map of the sums.");
   m.def(
       "harmonic_constants",
@@ -216,6 +218,9 @@ void bind_prefilter(nb::module_& m) {
         return rows_of(shader_constants(harmonics), harmonics.channels);
       },
       nb::arg("radiance"), "Nine constants (9, channels) of E/pi for a shader, in Filament's order.");
+}
+
+void bind_split_sum(nb::module_& m) {
   m.def(
       "split_sum",
       [](double cosine, double alpha) {
@@ -268,6 +273,15 @@ void bind_prefilter(nb::module_& m) {
       nb::arg("layout"), nb::arg("values"), nb::arg("directions"), nb::arg("world_from_camera"),
       nb::arg("world_from_camera_end"), nb::arg("steps"),
       "Picture (height, width, channels) of what a camera that turns sees.");
+}
+
+}  // namespace
+
+void bind_prefilter(nb::module_& m) {
+  bind_lobes(m);
+  bind_chain(m);
+  bind_harmonics(m);
+  bind_split_sum(m);
 }
 
 }  // namespace mirrorbake::bindings

@@ -1,5 +1,6 @@
 #include "bind.hpp"
 #include "mirrorbake/inference/probe.hpp"
+#include "signature.hpp"
 
 namespace mirrorbake::bindings {
 
@@ -39,10 +40,9 @@ void bind_probe(nb::module_& m) {
       nb::arg("topology"), nb::arg("render"), nb::kw_only(),
       nb::arg("most_renderings") = ProbeOptions{}.most_renderings, nb::arg("step") = ProbeOptions{}.step,
       nb::arg("tolerance") = ProbeOptions{}.tolerance,
-      nb::sig("def probe_rendering_matrix(topology: TexelTopology | CubePyramidLayout, render: "
-              "collections.abc.Callable[[numpy.typing.NDArray[numpy.float32]], "
-              "numpy.typing.NDArray[numpy.float32]], *, most_renderings: int = 64, step: float = 0.0, "
-              "tolerance: float = 1e-4) -> ProbedMatrix"),
+      signature<R"(def probe_rendering_matrix(topology: TexelTopology | CubePyramidLayout,
+render: collections.abc.Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]],
+*, most_renderings: int = 64, step: float = 0.0, tolerance: float = 1e-4) -> ProbedMatrix)">(),
       R"(Rendering matrix of a renderer of which only pictures are to be had ([PEM] section 4).
 
 topology: of the map. render: draws the view with the map's texels, float32 (texels, 3) in [0, 1], all levels as

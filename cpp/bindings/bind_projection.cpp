@@ -7,6 +7,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/projection/dual_paraboloid.hpp"
 #include "mirrorbake/projection/projection.hpp"
+#include "signature.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -15,9 +16,7 @@ using FaceArray = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb:
 using PositionArray = nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 using Matrix3 = nb::ndarray<const float, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 
-}  // namespace
-
-void bind_projection(nb::module_& m) {
+void bind_positions(nb::module_& m) {
   m.def(
       "points_from_directions",
       [](const std::string& projection, PointArray directions) {
@@ -37,10 +36,10 @@ void bind_projection(nb::module_& m) {
         return nb::make_tuple(to_numpy(std::move(faces), {count}), vectors_to_numpy(std::move(points)));
       },
       nb::arg("projection"), nb::arg("directions"),
-      nb::sig("def points_from_directions(projection: str, directions: NDArray[numpy.float32]) -> "
-              "tuple[NDArray[numpy.int32], NDArray[numpy.float32]]"),
-      "Faces (n) and positions (n, 2), x to the right and y up in [-1, 1], of directions (n, 3). Raises\n"
-      "InvalidArgument for NaN, infinite and zero directions.");
+      signature<R"(def points_from_directions(projection: str, directions: NDArray[numpy.float32]) ->
+tuple[NDArray[numpy.int32], NDArray[numpy.float32]])">(),
+      R"(Faces (n) and positions (n, 2), x to the right and y up in [-1, 1], of directions (n, 3). Raises
+InvalidArgument for NaN, infinite and zero directions.)");
   m.def(
       "directions_from_points",
       [](const std::string& projection, FaceArray faces, PositionArray points) {
@@ -55,9 +54,11 @@ void bind_projection(nb::module_& m) {
         return vectors_to_numpy(std::move(directions));
       },
       nb::arg("projection"), nb::arg("faces"), nb::arg("points"),
-      "Unit directions (n, 3) at positions (n, 2) of faces (n). Raises InvalidArgument for faces that do not "
-      "exist\n"
-      "and positions that are not finite.");
+      R"(Unit directions (n, 3) at positions (n, 2) of faces (n). Raises InvalidArgument for faces that
+do not exist and positions that are not finite.)");
+}
+
+void bind_texels(nb::module_& m) {
   m.def(
       "texel_solid_angles",
       [](const std::string& projection, int width, int height) {
@@ -66,8 +67,11 @@ void bind_projection(nb::module_& m) {
                         {static_cast<std::size_t>(height), static_cast<std::size_t>(width)});
       },
       nb::arg("projection"), nb::arg("width"), nb::arg("height"),
-      "Solid angles in steradians of the texels of a face, float64 of shape (height, width). Faces are "
-      "alike.");
+      R"(Solid angles in steradians of the texels of a face, float64 of shape (height, width). Faces are
+alike.)");
+  m.def(
+      "face_count", [](const std::string& projection) { return face_count(parse_projection(projection)); },
+      nb::arg("projection"), "Faces of a map: 6 of a cube, 2 of dual paraboloids, else 1.");
   m.def(
       "solid_angle_density",
       [](const std::string& projection, int face, double x, double y) {
@@ -95,9 +99,15 @@ void bind_projection(nb::module_& m) {
         return to_numpy(std::move(rows), {4, 4});
       },
       nb::arg("frame_from_map"), nb::arg("face"),
-      "The 4x4 texture matrix of [EMT] eq. 9-12 for the front (0) or back (1) map: applied to (r, 1) it "
-      "gives\n"
-      "(s q, t q, ., q), t downwards.");
+      R"(The 4x4 texture matrix of [EMT] eq. 9-12 for the front (0) or back (1) map: applied to (r, 1) it
+gives (s q, t q, ., q), t downwards.)");
+}
+
+}  // namespace
+
+void bind_projection(nb::module_& m) {
+  bind_positions(m);
+  bind_texels(m);
 }
 
 }  // namespace mirrorbake::bindings

@@ -173,54 +173,8 @@ std::span<const glm::vec3> points(const PointArray& array) {
   return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
 }
 
-}  // namespace
-
-void bind_proxy(nb::module_& m) {
-  nb::class_<Proxy> proxy(
-      m, "Proxy", R"(The shape on which an environment map lies ([PEM] section 4), with the map's origin.
-
-Made by the static constructors. Immutable. Positions and extents are world space, in metres; `axes` is a (3, 3)
-array whose rows are the shape's own axes in world space (default: aligned with the world's).)");
-  proxy
-      .def_static(
-          "infinite", [](glm::vec3 origin) { return make_proxy(InfiniteSphere{}, origin); },
-          nb::arg("origin") = glm::vec3(0.0F), "The classic environment map: only the direction counts.")
-      .def_static(
-          "box",
-          [](glm::vec3 centre, glm::vec3 half_extent, std::optional<glm::vec3> origin,
-             std::optional<Axes> axes) {
-            return make_proxy(Box{centre, half_extent, axes_matrix(axes)}, origin.value_or(centre));
-          },
-          nb::arg("centre"), nb::arg("half_extent"), nb::arg("origin") = nb::none(),
-          nb::arg("axes") = nb::none(),
-          "A box. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for unusable "
-          "values.")
-      .def_static(
-          "ellipsoid",
-          [](glm::vec3 centre, glm::vec3 radii, std::optional<glm::vec3> origin, std::optional<Axes> axes) {
-            return make_proxy(Ellipsoid{centre, radii, axes_matrix(axes)}, origin.value_or(centre));
-          },
-          nb::arg("centre"), nb::arg("radii"), nb::arg("origin") = nb::none(), nb::arg("axes") = nb::none(),
-          "An ellipsoid. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for "
-          "unusable "
-          "values.")
-      .def_static(
-          "sphere",
-          [](glm::vec3 centre, float radius, std::optional<glm::vec3> origin) {
-            return make_proxy(Ellipsoid{centre, glm::vec3(radius)}, origin.value_or(centre));
-          },
-          nb::arg("centre"), nb::arg("radius"), nb::arg("origin") = nb::none(),
-          "A finite sphere: an ellipsoid with three equal radii.")
-      .def_static(
-          "hemisphere",
-          [](glm::vec3 centre, float radius, glm::vec3 origin, std::optional<Axes> axes) {
-            return make_proxy(Hemisphere{centre, radius, axes_matrix(axes)}, origin);
-          },
-          nb::arg("centre"), nb::arg("radius"), nb::arg("origin"), nb::arg("axes") = nb::none(),
-          "The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie inside, "
-          "above the "
-          "floor.")
-      .def_prop_ro("kind", &kind_name, "'infinite', 'box', 'ellipsoid' or 'hemisphere'.")
+void bind_attributes(nb::class_<Proxy>& proxy) {
+  proxy.def_prop_ro("kind", &kind_name, "'infinite', 'box', 'ellipsoid' or 'hemisphere'.")
       .def_ro("origin", &Proxy::origin, "Origin of the map: lookups are directions seen from here.")
       .def_prop_ro(
           "centre",
@@ -262,7 +216,11 @@ array whose rows are the shape's own axes in world space (default: aligned with 
             return to_numpy(std::vector<float>(&rows[0][0], &rows[0][0] + 9), {3, 3});
           },
           nb::rv_policy::move,
-          "The shape's own axes in world space, one per row. AttributeError if it is infinite.")
+          "The shape's own axes in world space, one per row. AttributeError if it is infinite.");
+}
+
+void bind_lookups(nb::class_<Proxy>& proxy) {
+  proxy
       .def("lookup", &lookup<float>, nb::arg("positions"), nb::arg("directions"),
            R"(Directions in which the map is read by rays.
 
@@ -319,7 +277,56 @@ InvalidArgument
         }
         return text + ")";
       });
+}
 
+void bind_shapes(nb::module_& m) {
+  nb::class_<Proxy> proxy(
+      m, "Proxy", R"(The shape on which an environment map lies ([PEM] section 4), with the map's origin.
+
+Made by the static constructors. Immutable. Positions and extents are world space, in metres; `axes` is a (3, 3)
+array whose rows are the shape's own axes in world space (default: aligned with the world's).)");
+  proxy
+      .def_static(
+          "infinite", [](glm::vec3 origin) { return make_proxy(InfiniteSphere{}, origin); },
+          nb::arg("origin") = glm::vec3(0.0F), "The classic environment map: only the direction counts.")
+      .def_static(
+          "box",
+          [](glm::vec3 centre, glm::vec3 half_extent, std::optional<glm::vec3> origin,
+             std::optional<Axes> axes) {
+            return make_proxy(Box{centre, half_extent, axes_matrix(axes)}, origin.value_or(centre));
+          },
+          nb::arg("centre"), nb::arg("half_extent"), nb::arg("origin") = nb::none(),
+          nb::arg("axes") = nb::none(),
+          R"(A box. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for
+unusable values.)")
+      .def_static(
+          "ellipsoid",
+          [](glm::vec3 centre, glm::vec3 radii, std::optional<glm::vec3> origin, std::optional<Axes> axes) {
+            return make_proxy(Ellipsoid{centre, radii, axes_matrix(axes)}, origin.value_or(centre));
+          },
+          nb::arg("centre"), nb::arg("radii"), nb::arg("origin") = nb::none(), nb::arg("axes") = nb::none(),
+          R"(An ellipsoid. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument
+for unusable values.)")
+      .def_static(
+          "sphere",
+          [](glm::vec3 centre, float radius, std::optional<glm::vec3> origin) {
+            return make_proxy(Ellipsoid{centre, glm::vec3(radius)}, origin.value_or(centre));
+          },
+          nb::arg("centre"), nb::arg("radius"), nb::arg("origin") = nb::none(),
+          "A finite sphere: an ellipsoid with three equal radii.")
+      .def_static(
+          "hemisphere",
+          [](glm::vec3 centre, float radius, glm::vec3 origin, std::optional<Axes> axes) {
+            return make_proxy(Hemisphere{centre, radius, axes_matrix(axes)}, origin);
+          },
+          nb::arg("centre"), nb::arg("radius"), nb::arg("origin"), nb::arg("axes") = nb::none(),
+          R"(The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie
+inside, above the floor.)");
+  bind_attributes(proxy);
+  bind_lookups(proxy);
+}
+
+void bind_mirror_lookups(nb::module_& m) {
   m.def("mirror_lookups", &mirror_lookups_of_layers, nb::arg("proxies"), nb::arg("eye"), nb::arg("positions"),
         nb::arg("normals"), R"(Texture coordinates of a mirror's vertices or pixels in several layers at once.
 
@@ -340,6 +347,9 @@ Raises
 ------
 InvalidArgument
     As Proxy.mirror_lookup(); no proxies.)");
+}
+
+void bind_fits(nb::module_& m) {
   m.def(
       "area_weighted_centroid",
       [](PointArray positions, TriangleArray triangles) {
@@ -348,10 +358,11 @@ InvalidArgument
         return area_weighted_centroid(points(positions), indices);
       },
       nb::arg("positions"), nb::arg("triangles"),
-      "Area-weighted mean of the triangles' centroids: the origin of an object's maps ([PEM] section 4).\n\n"
-      "`positions` (n, 3) in metres, `triangles` (m, 3) indices. Returns (x, y, z). Raises InvalidArgument "
-      "for indices "
-      "out of range and for meshes without area.");
+      R"(Area-weighted mean of the triangles' centroids: the origin of an object's maps ([PEM] section
+4).
+
+`positions` (n, 3) in metres, `triangles` (m, 3) indices. Returns (x, y, z). Raises InvalidArgument for
+indices out of range and for meshes without area.)");
   m.def(
       "fit_ellipsoid",
       [](PointArray array, glm::vec3 centre, std::optional<glm::vec3> origin) {
@@ -359,11 +370,11 @@ InvalidArgument
         return make_proxy(fit_ellipsoid(points(array), centre), origin.value_or(centre));
       },
       nb::arg("points"), nb::arg("centre"), nb::arg("origin") = nb::none(),
-      "Minimum-volume axis-aligned ellipsoid around `centre` that encloses every point, to a relative volume "
-      "of 1e-6.\n\n"
-      "`points` (n, 3). `origin` of the returned Proxy defaults to `centre`. Flat input gets radii of at "
-      "least 1e-4 of "
-      "the largest extent. Raises InvalidArgument if all points lie at the centre.");
+      R"(Minimum-volume axis-aligned ellipsoid around `centre` that encloses every point, to a relative
+volume of 1e-6.
+
+`points` (n, 3). `origin` of the returned Proxy defaults to `centre`. Flat input gets radii of at least
+1e-4 of the largest extent. Raises InvalidArgument if all points lie at the centre.)");
   m.def(
       "fit_box_mean_distance",
       [](PointArray hits, glm::vec3 origin, float floor) {
@@ -371,11 +382,11 @@ InvalidArgument
         return make_proxy(fit_box_mean_distance(points(hits), origin, floor), origin);
       },
       nb::arg("hits"), nb::arg("origin"), nb::arg("floor"),
-      "Box by [PEM] section 4: bottom on the plane y = `floor`, the other sides at the mean distance of the "
-      "hits on "
-      "that side.\n\n`hits` (n, 3): where rays from around the object meet the surroundings. Returns a Proxy "
-      "with the "
-      "given origin.");
+      R"(Box by [PEM] section 4: bottom on the plane y = `floor`, the other sides at the mean distance of
+the hits on that side.
+
+`hits` (n, 3): where rays from around the object meet the surroundings. Returns a Proxy with the given
+origin.)");
   m.def(
       "fit_box_robust",
       [](PointArray hits, glm::vec3 origin) {
@@ -383,10 +394,13 @@ InvalidArgument
         return make_proxy(fit_box_robust(points(hits), origin), origin);
       },
       nb::arg("hits"), nb::arg("origin"),
-      "Axis-aligned box around `origin` that fits the hits best, by robust (Huber) least squares of their "
-      "distances to "
-      "its surface.\n\n`hits` (n, 3). Returns a Proxy with the given origin.");
+      R"(Axis-aligned box around `origin` that fits the hits best, by robust (Huber) least squares of
+their distances to its surface.
 
+`hits` (n, 3). Returns a Proxy with the given origin.)");
+}
+
+void bind_choice(nb::module_& m) {
   nb::class_<ProxyCandidate>(m, "ProxyCandidate", "A shape that choose_proxy() fitted.")
       .def_ro("name", &ProxyCandidate::name,
               "'infinite', 'sphere', 'hemisphere', 'box', 'ellipsoid', 'rotated box' or 'rotated ellipsoid'.")
@@ -459,8 +473,17 @@ InvalidArgument
         return to_numpy(std::move(on_hull), {indices.size()});
       },
       nb::arg("positions"), nb::arg("triangles"), nb::arg("tolerance") = kHullTolerance,
-      "1 for every triangle that lies on the mesh's convex hull, else 0; see "
-      "mirrorbake.proxy.hull_triangles.");
+      R"(1 for every triangle that lies on the mesh's convex hull, else 0; see
+mirrorbake.proxy.hull_triangles.)");
+}
+
+}  // namespace
+
+void bind_proxy(nb::module_& m) {
+  bind_shapes(m);
+  bind_mirror_lookups(m);
+  bind_fits(m);
+  bind_choice(m);
 }
 
 }  // namespace mirrorbake::bindings

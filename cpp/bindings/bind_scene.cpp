@@ -1,5 +1,4 @@
 #include <nanobind/stl/array.h>
-#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -8,9 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstring>
 #include <memory>
-#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -19,26 +16,14 @@
 #include "bind.hpp"
 #include "bind_enums.hpp"
 #include "mirrorbake/core/error.hpp"
-#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/scene/load.hpp"
 #include "mirrorbake/scene/room.hpp"
 #include "mirrorbake/scene/scene.hpp"
-#include "mirrorbake/scene/shapes.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
 
-using TriangleArray = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using UvArray = nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
-using PartArray = nb::ndarray<const std::uint16_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 using RgbImage = nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
-
-template <typename Element, typename Array>
-std::vector<Element> copied(const Array& array) {
-  std::vector<Element> elements(array.shape(0));
-  if (!elements.empty()) std::memcpy(elements.data(), array.data(), elements.size() * sizeof(Element));
-  return elements;
-}
 
 Image rgb_image(const RgbImage& pixels) {
   Image image;
@@ -70,142 +55,6 @@ std::vector<std::string> names(const std::vector<Named>& elements) {
   std::vector<std::string> result;
   for (const Named& e : elements) result.push_back(e.name);
   return result;
-}
-
-const TriangleMesh& mesh_of(nb::handle self) { return nb::cast<const TriangleMesh&>(self); }
-
-void bind_mesh(nb::module_& m) {
-  nb::class_<TriangleMesh>(
-      m, "TriangleMesh",
-      "Triangles with optional vertex normals, texture coordinates and parts. World space, metres.")
-      .def(
-          "__init__",
-          [](TriangleMesh* self, const PointArray& positions, const TriangleArray& triangles,
-             const std::optional<PointArray>& normals, const std::optional<UvArray>& uvs,
-             const std::optional<PartArray>& parts, const std::optional<PointArray>& colors) {
-            TriangleMesh mesh;
-            mesh.positions = copied<glm::vec3>(positions);
-            mesh.triangles = copied<glm::uvec3>(triangles);
-            if (normals) mesh.normals = copied<glm::vec3>(*normals);
-            if (uvs) mesh.uvs = copied<glm::vec2>(*uvs);
-            if (parts) mesh.parts = copied<std::uint16_t>(*parts);
-            if (colors) mesh.colors = copied<glm::vec3>(*colors);
-            validate(mesh);
-            new (self) TriangleMesh(std::move(mesh));
-          },
-          nb::arg("positions"), nb::arg("triangles"), nb::arg("normals") = nb::none(),
-          nb::arg("uvs") = nb::none(), nb::arg("parts") = nb::none(), nb::arg("colors") = nb::none(),
-          "Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from outside, "
-          "unit\n"
-          "normals (V, 3) (default: flat shading), uvs (V, 2) with v up, the part of each triangle (T,), and "
-          "colours\n"
-          "(V, 3) in [0, 1], linear, that multiply the material's albedo. "
-          "Raises\n"
-          "InvalidArgument for anything not finite, indices out of range or a mesh without area.")
-      .def_prop_ro(
-          "positions", [](nb::handle self) { return vectors_view(mesh_of(self).positions, self); },
-          "Vertices, (V, 3), a read-only view.")
-      .def_prop_ro(
-          "normals", [](nb::handle self) { return vectors_view(mesh_of(self).normals, self); },
-          "Unit vertex normals, (V, 3), or (0, 3) for flat shading.")
-      .def_prop_ro(
-          "uvs", [](nb::handle self) { return vectors_view(mesh_of(self).uvs, self); },
-          "Texture coordinates, (V, 2), v up, or (0, 2).")
-      .def_prop_ro(
-          "triangles", [](nb::handle self) { return vectors_view(mesh_of(self).triangles, self); },
-          "Vertex indices, (T, 3).")
-      .def_prop_ro(
-          "parts", [](nb::handle self) { return scalars_view(mesh_of(self).parts, self); },
-          "Part of each triangle, (T,), or (0,) if all belong to part 0.")
-      .def_prop_ro(
-          "colors", [](nb::handle self) { return vectors_view(mesh_of(self).colors, self); },
-          "Colours of the vertices, (V, 3), linear, or (0, 3) if they have none.")
-      .def("__getstate__",
-           [](const TriangleMesh& mesh) {
-             return nb::make_tuple(
-                 vectors_to_numpy(std::vector(mesh.positions)), vectors_to_numpy(std::vector(mesh.triangles)),
-                 vectors_to_numpy(std::vector(mesh.normals)), vectors_to_numpy(std::vector(mesh.uvs)),
-                 to_numpy(std::vector(mesh.parts), {mesh.parts.size()}),
-                 vectors_to_numpy(std::vector(mesh.colors)));
-           })
-      .def(
-          "__setstate__",
-          [](TriangleMesh& self,
-             const std::tuple<PointArray, TriangleArray, PointArray, UvArray, PartArray, PointArray>& state) {
-            const auto& [positions, triangles, normals, uvs, parts, colors] = state;
-            TriangleMesh mesh;
-            mesh.positions = copied<glm::vec3>(positions);
-            mesh.triangles = copied<glm::uvec3>(triangles);
-            mesh.normals = copied<glm::vec3>(normals);
-            mesh.uvs = copied<glm::vec2>(uvs);
-            mesh.parts = copied<std::uint16_t>(parts);
-            mesh.colors = copied<glm::vec3>(colors);
-            validate(mesh);
-            new (&self) TriangleMesh(std::move(mesh));
-          })
-      .def("__repr__", [](const TriangleMesh& mesh) {
-        return "TriangleMesh(" + std::to_string(mesh.positions.size()) + " vertices, " +
-               std::to_string(mesh.triangles.size()) + " triangles)";
-      });
-
-  m.def(
-      "bounds",
-      [](const TriangleMesh& mesh) {
-        const Bounds box = bounds(mesh);
-        return std::pair(box.min, box.max);
-      },
-      nb::arg("mesh"), "Smallest and largest coordinates of a mesh's vertices.");
-}
-
-void bind_shapes(nb::module_& m) {
-  using Released = nb::call_guard<nb::gil_scoped_release>;
-  m.def("make_teapot", &make_teapot, nb::arg("subdivisions") = 25, nb::arg("height") = 0.15F, Released(),
-        "The Utah teapot of 32 Bezier patches, `subdivisions`² × 2 triangles each (1 to 512; 25 gives the "
-        "40,000 of\n"
-        "[PEM] §6), `height` metres high, standing on y = 0 with the spout along +X. Parts: 0 body, 1 lid.");
-  m.def("teapot_part_names", &teapot_part_names, "Names of the teapot's parts, in order.");
-  m.def("make_box", &make_box, nb::arg("min"), nb::arg("max"), Released(),
-        "Box with axis-aligned sides, each with texture coordinates 0 to 1.");
-  m.def("make_sphere", &make_sphere, nb::arg("centre"), nb::arg("radius"), nb::arg("segments") = 48,
-        Released(), "Latitude-longitude sphere with `segments` (3 to 4096) around the equator.");
-  m.def("make_cylinder", &make_cylinder, nb::arg("base"), nb::arg("radius"), nb::arg("height"),
-        nb::arg("segments") = 48, Released(),
-        "Upright closed cylinder; `base` is the centre of its lower cap.");
-  m.def("make_cone", &make_cone, nb::arg("base"), nb::arg("radius"), nb::arg("height"),
-        nb::arg("segments") = 48, Released(), "Upright closed cone; `base` is the centre of its base.");
-  m.def("make_torus", &make_torus, nb::arg("centre"), nb::arg("ring_radius"), nb::arg("tube_radius"),
-        nb::arg("segments") = 48, Released(), "Torus about the vertical axis through `centre`.");
-  m.def("make_rectangle", &make_rectangle, nb::arg("corner"), nb::arg("u"), nb::arg("v"), Released(),
-        "Rectangle corner, corner + u, corner + u + v, corner + v, facing u × v.");
-  m.def(
-      "load_mesh",
-      [](const PathText& path, std::array<double, 3> origin) {
-        return load_mesh(path.text, {}, {origin[0], origin[1], origin[2]});
-      },
-      nb::arg("path"), nb::kw_only(), nb::arg("origin") = std::array{0.0, 0.0, 0.0}, Released(),
-      "Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied\n"
-      "(instances become copies) and missing vertex normals made by angle-weighted averaging. `origin`: as "
-      "of\n"
-      "load_scene. Raises FileError if the file is missing, corrupt, empty or refers to files outside its\n"
-      "directory.");
-}
-
-void bind_winding(nb::module_& m) {
-  m.def(
-      "winding_number",
-      [](const TriangleMesh& mesh, std::array<double, 3> point) {
-        return winding_number(mesh, {point[0], point[1], point[2]});
-      },
-      nb::arg("mesh"), nb::arg("point"),
-      "How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van\n"
-      "Oosterom and Strackee 1983). Exactly 0 outside of the bounding box.");
-  m.def(
-      "encloses",
-      [](const TriangleMesh& mesh, std::array<double, 3> point) {
-        return encloses(mesh, {point[0], point[1], point[2]});
-      },
-      nb::arg("mesh"), nb::arg("point"),
-      "Whether a point, such as an eye, lies inside of a body: whether it winds about it more than half.");
 }
 
 void bind_visibility(nb::module_& m) {
@@ -253,82 +102,23 @@ void bind_loaded_scene(nb::module_& m) {
       nb::arg("max_vertices") = MeshLimits{}.max_vertices,
       nb::arg("max_triangles") = MeshLimits{}.max_triangles, nb::arg("luminous_efficacy") = 1.0F,
       nb::arg("origin") = std::array{0.0, 0.0, 0.0}, nb::call_guard<nb::gil_scoped_release>(),
-      "Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,\n"
-      "materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in\n"
-      "memory are read through the cache of texture files. glTF's candela, lux and nits are divided by\n"
-      "`luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's\n"
-      "zero, before positions are rounded to float32. Raises FileError if a file is missing, corrupt, "
-      "beyond\n"
-      "a limit or refers to files outside its directory.");
+      R"(Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,
+materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in memory
+are read through the cache of texture files. glTF's candela, lux and nits are divided by
+`luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's zero,
+before positions are rounded to float32. Raises FileError if a file is missing, corrupt, beyond a limit
+or refers to files outside its directory.)");
   m.def(
       "referenced_files",
       [](const PathText& path, FileContent content) { return referenced_files(path.text, content); },
       nb::arg("path"), nb::arg("content"), nb::call_guard<nb::gil_scoped_release>(),
-      "The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF file "
-      "and,\n"
-      "for a scene, its images, or the material libraries of an OBJ file and their images. Absolute, each "
-      "once,\n"
-      "not those that do not exist. Raises FileError if `path` or a library is missing or corrupt.");
+      R"(The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF
+file and, for a scene, its images, or the material libraries of an OBJ file and their images. Absolute,
+each once, not those that do not exist. Raises FileError if `path` or a library is missing or corrupt.)");
 }
 
-}  // namespace
-
-void bind_scene(nb::module_& m) {
-  bind_mesh(m);
-  bind_shapes(m);
-  bind_visibility(m);
-  bind_winding(m);
-
-  nb::class_<Scene>(
-      m, "Scene",
-      "Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours and\n"
-      "radiance are scene-linear with Rec.709 primaries. The add_ functions return the new thing's index.")
-      .def(nb::init<>())
-      .def(
-          "translate",
-          [](Scene& scene, std::array<double, 3> by) {
-            translate(scene, {by[0], by[1], by[2]});
-          },
-          nb::arg("by"), "Move everything that has a place: objects, and lights that are not at infinity.")
-      .def(
-          "add_texture",
-          [](Scene& scene, const RgbImage& pixels, TextureWrap wrap_u, TextureWrap wrap_v) {
-            return append(scene.textures, Texture{rgb_image(pixels), wrap_u, wrap_v});
-          },
-          nb::arg("pixels"), nb::arg("wrap_u") = TextureWrap::repeat, nb::arg("wrap_v") = TextureWrap::repeat,
-          "Add a texture of shape (height, width, 3), values in [0, 1], row 0 at the top.")
-      .def(
-          "add_texture_file",
-          [](Scene& scene, const PathText& path, TextureWrap wrap_u, TextureWrap wrap_v, Transfer transfer) {
-            Texture texture;
-            texture.wrap_u = wrap_u;
-            texture.wrap_v = wrap_v;
-            {
-              nb::gil_scoped_release released;
-              texture.file = std::make_shared<TextureFile>(path.text, transfer);
-            }
-            return append(scene.textures, std::move(texture));
-          },
-          nb::arg("path"), nb::arg("wrap_u") = TextureWrap::repeat, nb::arg("wrap_v") = TextureWrap::repeat,
-          nb::arg("transfer") = Transfer::automatic,
-          "Add a texture whose texels are read from an image file when they are needed, and kept in a cache\n"
-          "of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].")
-      .def(
-          "texture_pixels",
-          [](const Scene& scene, int texture) {
-            const Texture& chosen = element(scene.textures, "texture", texture);
-            Image image;
-            {
-              nb::gil_scoped_release released;
-              image = texture_image(chosen);
-            }
-            const auto [width, height] = std::pair<std::size_t, std::size_t>(image.width, image.height);
-            return to_numpy(std::move(image.pixels), {height, width, image.channels.size()});
-          },
-          nb::arg("texture"),
-          "Copy of a texture's texels, (height, width, 3), or (height, width, 1) for one channel that "
-          "stands\n"
-          "for all three; scene-linear, row 0 at the top. Raises FileError if its file has changed.")
+void bind_textures(nb::class_<Scene>& scene) {
+  scene
       .def(
           "texture_wrap",
           [](const Scene& scene, int texture) {
@@ -352,9 +142,8 @@ void bind_scene(nb::module_& m) {
           nb::arg("name"), nb::arg("mesh"), nb::arg("material"),
           nb::arg("part_names") = std::vector<std::string>{}, nb::arg("visibility") = Visibility::all,
           nb::arg("part_materials") = std::vector<int>{},
-          "Add a copy of a mesh, in world space, with the material of that index. `part_names` names its "
-          "parts, if it\n"
-          "has more than one; `part_materials` gives each a material of its own.")
+          R"(Add a copy of a mesh, in world space, with the material of that index. `part_names` names
+its parts, if it has more than one; `part_materials` gives each a material of its own.)")
       .def(
           "add_rectangle_light",
           [](Scene& scene, glm::vec3 corner, glm::vec3 edge_u, glm::vec3 edge_v, glm::vec3 radiance) {
@@ -374,16 +163,19 @@ void bind_scene(nb::module_& m) {
             return append(scene.sphere_lights, SphereLight{centre, radius, radiance});
           },
           nb::arg("centre"), nb::arg("radius"), nb::arg("radiance"),
-          "Add a sphere that emits `radiance` (W sr⁻¹ m⁻²) outwards.")
+          "Add a sphere that emits `radiance` (W sr⁻¹ m⁻²) outwards.");
+}
+
+void bind_lights(nb::class_<Scene>& scene) {
+  scene
       .def(
           "add_directional_light",
           [](Scene& scene, glm::vec3 direction, glm::vec3 irradiance) {
             return append(scene.directional_lights, DirectionalLight{direction, irradiance});
           },
           nb::arg("direction"), nb::arg("irradiance"),
-          "Add parallel light that travels along the unit vector `direction` and gives a surface that faces "
-          "it\n"
-          "`irradiance` W m⁻².")
+          R"(Add parallel light that travels along the unit vector `direction` and gives a surface that
+faces it `irradiance` W m⁻².)")
       .def(
           "add_spot_light",
           [](Scene& scene, glm::vec3 position, glm::vec3 direction, glm::vec3 intensity, float inner_degrees,
@@ -393,20 +185,17 @@ void bind_scene(nb::module_& m) {
           },
           nb::arg("position"), nb::arg("direction"), nb::arg("intensity"), nb::arg("inner_degrees") = 0.0F,
           nb::arg("outer_degrees") = 45.0F,
-          "Add a light of `intensity` W sr⁻¹ along the unit vector `direction`: in full up to "
-          "`inner_degrees` from\n"
-          "that axis, falling to 0 at `outer_degrees` (at most 90).")
+          R"(Add a light of `intensity` W sr⁻¹ along the unit vector `direction`: in full up to
+`inner_degrees` from that axis, falling to 0 at `outer_degrees` (at most 90).)")
       .def(
           "set_environment",
           [](Scene& scene, const RgbImage& panorama, float scale, float rotation_degrees) {
             scene.environment = EnvironmentLight{rgb_image(panorama), scale, rotation_degrees};
           },
           nb::arg("panorama"), nb::arg("scale") = 1.0F, nb::arg("rotation_degrees") = 0.0F,
-          "Surround the scene with a latitude-longitude panorama of radiance, shape (height, width, 3): its "
-          "centre looks\n"
-          "along −Z, +X is to the right of the centre, +Y is the top row. It is multiplied with `scale` and "
-          "turned\n"
-          "counter-clockwise about +Y, seen from above.")
+          R"(Surround the scene with a latitude-longitude panorama of radiance, shape (height, width, 3):
+its centre looks along −Z, +X is to the right of the centre, +Y is the top row. It is multiplied with
+`scale` and turned counter-clockwise about +Y, seen from above.)")
       .def(
           "add_materials", [](Scene& scene, const Scene& other) { return add_materials(scene, other); },
           nb::arg("other"),
@@ -419,10 +208,12 @@ void bind_scene(nb::module_& m) {
                               std::move(joined.part_materials));
           },
           nb::arg("most_parts"),
-          "All objects in one mesh: (mesh, part names, index of each part's material). A part is an object, "
-          "or, if\n"
-          "there are more than `most_parts`, what is of one material.")
-      .def_prop_ro("object_names", [](const Scene& scene) { return names(scene.objects); })
+          R"(All objects in one mesh: (mesh, part names, index of each part's material). A part is an
+object, or, if there are more than `most_parts`, what is of one material.)");
+}
+
+void bind_contents(nb::class_<Scene>& scene) {
+  scene.def_prop_ro("object_names", [](const Scene& scene) { return names(scene.objects); })
       .def_prop_ro("material_names", [](const Scene& scene) { return names(scene.materials); })
       .def(
           "object_mesh",
@@ -489,12 +280,72 @@ void bind_scene(nb::module_& m) {
       .def(
           "validate", [](const Scene& scene) { validate(scene); },
           "Raise InvalidArgument, naming the object and the field, if anything in the scene is unusable.");
+}
 
+void bind_scene_class(nb::module_& m) {
+  nb::class_<Scene> scene(
+      m, "Scene",
+      R"(Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours
+and radiance are scene-linear with Rec.709 primaries. The add_ functions return the new thing's index.)");
+  scene.def(nb::init<>())
+      .def(
+          "translate",
+          [](Scene& scene, std::array<double, 3> by) {
+            translate(scene, {by[0], by[1], by[2]});
+          },
+          nb::arg("by"), "Move everything that has a place: objects, and lights that are not at infinity.")
+      .def(
+          "add_texture",
+          [](Scene& scene, const RgbImage& pixels, TextureWrap wrap_u, TextureWrap wrap_v) {
+            return append(scene.textures, Texture{rgb_image(pixels), wrap_u, wrap_v});
+          },
+          nb::arg("pixels"), nb::arg("wrap_u") = TextureWrap::repeat, nb::arg("wrap_v") = TextureWrap::repeat,
+          "Add a texture of shape (height, width, 3), values in [0, 1], row 0 at the top.")
+      .def(
+          "add_texture_file",
+          [](Scene& scene, const PathText& path, TextureWrap wrap_u, TextureWrap wrap_v, Transfer transfer) {
+            Texture texture;
+            texture.wrap_u = wrap_u;
+            texture.wrap_v = wrap_v;
+            {
+              nb::gil_scoped_release released;
+              texture.file = std::make_shared<TextureFile>(path.text, transfer);
+            }
+            return append(scene.textures, std::move(texture));
+          },
+          nb::arg("path"), nb::arg("wrap_u") = TextureWrap::repeat, nb::arg("wrap_v") = TextureWrap::repeat,
+          nb::arg("transfer") = Transfer::automatic,
+          R"(Add a texture whose texels are read from an image file when they are needed, and kept in a
+cache of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].)")
+      .def(
+          "texture_pixels",
+          [](const Scene& scene, int texture) {
+            const Texture& chosen = element(scene.textures, "texture", texture);
+            Image image;
+            {
+              nb::gil_scoped_release released;
+              image = texture_image(chosen);
+            }
+            const auto [width, height] = std::pair<std::size_t, std::size_t>(image.width, image.height);
+            return to_numpy(std::move(image.pixels), {height, width, image.channels.size()});
+          },
+          nb::arg("texture"),
+          R"(Copy of a texture's texels, (height, width, 3), or (height, width, 1) for one channel that
+stands for all three; scene-linear, row 0 at the top. Raises FileError if its file has changed.)");
+  bind_textures(scene);
+  bind_lights(scene);
+  bind_contents(scene);
+}
+
+}  // namespace
+
+void bind_scene(nb::module_& m) {
+  bind_visibility(m);
+  bind_scene_class(m);
   bind_loaded_scene(m);
   m.def("make_room", &make_room, nb::call_guard<nb::gil_scoped_release>(),
-        "The built-in furnished room. The table's top is the plane y = 0 with its centre at the origin; the "
-        "reflector,\n"
-        "which is not part of it, stands there.");
+        R"(The built-in furnished room. The table's top is the plane y = 0 with its centre at the origin;
+the reflector, which is not part of it, stands there.)");
 }
 
 }  // namespace mirrorbake::bindings

@@ -86,9 +86,7 @@ Triple triple(const V& v) {
   return {v[0], v[1], v[2]};
 }
 
-}  // namespace
-
-void bind_shading(nb::module_& m) {
+void bind_formulas(nb::module_& m) {
   bind_precision<float>(m);
   bind_precision<double>(m);
 
@@ -119,6 +117,9 @@ void bind_shading(nb::module_& m) {
           },
           nb::arg("c").noconvert(), nb::arg("f").noconvert(), NoGil(),
           "Fills `f` with interpolated reflectance.");
+}
+
+void bind_tables(nb::module_& m) {
   m.def(
       "make_fresnel_table",
       [](FresnelModel model, double first, double k, std::size_t size) {
@@ -156,6 +157,9 @@ void bind_shading(nb::module_& m) {
         return to_numpy(std::move(rows), {count, 3});
       },
       nb::arg("metal"), "float64 (n, 3): wavelength in nm, eta, k.");
+}
+
+void bind_metals(nb::module_& m) {
   m.def(
       "metal_reflectance",
       [](const std::string& metal, Values<double> c, Illuminant illuminant) {
@@ -192,6 +196,14 @@ void bind_shading(nb::module_& m) {
   m.def(
       "active_isa", [] { return std::string(to_string(active_isa())); },
       "Instruction set in use: 'baseline', 'sse42', 'avx2' or 'avx512'.");
+}
+
+}  // namespace
+
+void bind_shading(nb::module_& m) {
+  bind_formulas(m);
+  bind_tables(m);
+  bind_metals(m);
 }
 
 }  // namespace mirrorbake::bindings

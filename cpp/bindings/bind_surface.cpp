@@ -47,10 +47,9 @@ void bind_shell_light(nb::module_& m) {
 void bind_samples(nb::module_& m) {
   nb::class_<SurfaceSamples> c(
       m, "SurfaceSamples",
-      "Where the samples of an image's pixels first meet the reflector: one entry "
-      "per sample that sees it, ordered by\n"
-      "pixel, then by sample. All arrays are read-only views; `diffuse` and `shells` "
-      "are empty when no light was traced.");
+      R"(Where the samples of an image's pixels first meet the reflector: one entry per sample that sees
+it, ordered by pixel, then by sample. All arrays are read-only views; `diffuse` and `shells` are empty
+when no light was traced.)");
   c.def_ro("width", &SurfaceSamples::width, "Of the image, pixels.");
   c.def_ro("height", &SurfaceSamples::height, "Of the image, pixels.");
   c.def_ro("samples_per_pixel", &SurfaceSamples::samples_per_pixel);
@@ -110,9 +109,9 @@ void bind_vertex_lookups(nb::module_& m) {
             {reinterpret_cast<const glm::vec3*>(lookups.data()), lookups.shape(0)});
       },
       nb::arg("samples"), nb::arg("positions"), nb::arg("triangles"), nb::arg("lookups"),
-      "Samples that read a map at coordinates of the vertices, float32 (V, 3), interpolated over every "
-      "triangle ([PEM]\nsection 5): texture coordinates (u, v, 0), or lookups on a proxy. To be read through "
-      "Proxy.infinite, since\n`reflection` is then the lookup itself, of any length.");
+      R"(Samples that read a map at coordinates of the vertices, float32 (V, 3), interpolated over every
+triangle ([PEM] section 5): texture coordinates (u, v, 0), or lookups on a proxy. To be read through
+Proxy.infinite, since `reflection` is then the lookup itself, of any length.)");
 }
 
 RunTimeModel checked(RunTimeModel model) {
@@ -145,8 +144,8 @@ void bind_run_time(nb::module_& m) {
           nb::sig("def __eq__(self, other: object, /) -> bool"));
   m.def(
       "run_time_model", [](const std::string& name) { return run_time_model(name); }, nb::arg("name"),
-      "Web (four lookups per pixel on a rotated grid, footprint 1/2, up to 4 taps), Web1 (one lookup) or\n"
-      "Reference (16 lookups, footprint 1/4).");
+      R"(Web (four lookups per pixel on a rotated grid, footprint 1/2, up to 4 taps), Web1 (one lookup)
+or Reference (16 lookups, footprint 1/4).)");
 }
 
 }  // namespace

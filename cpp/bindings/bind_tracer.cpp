@@ -13,6 +13,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
+#include "signature.hpp"
 
 namespace mirrorbake::bindings {
 namespace {
@@ -27,11 +28,146 @@ std::span<const glm::vec3> points(const PointArray& array) {
   return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
 }
 
-}  // namespace
+void bind_tracing(nb::class_<Tracer>& tracer) {
+  tracer
+      .def(
+          "trace_layers",
+          [](const Tracer& tracer, const Camera& camera, const std::vector<int>& reflectors,
+             const TraceOptions& options) { return tracer.trace_layers(camera, reflectors, options); },
+          nb::arg("camera"), nb::arg("reflectors"), nb::arg("options") = TraceOptions{},
+          nb::call_guard<nb::gil_scoped_release>(),
+          signature<R"(def trace_layers(self, camera: Camera, reflectors: collections.abc.Sequence[int],
+options: TraceOptions = ...) -> list[LayerTrace])">(),
+          R"(Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as
+trace_layers gives.)")
+      .def(
+          "trace_visibility",
+          [](const Tracer& tracer, const Camera& camera, int reflector, const TraceOptions& options,
+             const std::vector<glm::vec2>& places) {
+            const nb::gil_scoped_release released;
+            return tracer.trace_visibility(camera, reflector, options, places);
+          },
+          nb::arg("camera"), nb::arg("reflector"), nb::arg("options") = TraceOptions{},
+          nb::arg("places") = std::vector<glm::vec2>{},
+          signature<R"(def trace_visibility(self, camera: Camera, reflector: int,
+options: TraceOptions = ..., places: collections.abc.Sequence[collections.abc.Sequence[float]] = ()) ->
+SurfaceSamples)">(),
+          R"(Only the geometry of `reflector`, by the same camera rays as trace_layers with the same
+options. With `places` (x, y in [0, 1) from the pixel's top left corner) the rays go through those places
+of every pixel instead, as a renderer's lookups do (RunTimeModel.places).)")
+      .def(
+          "capture",
+          [](const Tracer& tracer, glm::vec3 origin, const std::string& projection, int width, int height,
+             const std::vector<int>& hidden, const TraceOptions& options) {
+            const Projection p = parse_projection(projection);
+            Image image;
+            {
+              nb::gil_scoped_release released;
+              image = tracer.capture(origin, p, width, height, hidden, options);
+            }
+            const auto faces = static_cast<std::size_t>(face_count(p));
+            const auto rows = static_cast<std::size_t>(height);
+            const auto columns = static_cast<std::size_t>(width);
+            return faces > 1 ? to_numpy(std::move(image.pixels), {faces, rows, columns, 3})
+                             : to_numpy(std::move(image.pixels), {rows, columns, 3});
+          },
+          nb::arg("origin"), nb::arg("projection"), nb::arg("width"), nb::arg("height"),
+          nb::arg("hidden") = std::vector<int>{}, nb::arg("options") = TraceOptions{},
+          signature<R"(def capture(self, origin: collections.abc.Sequence[float], projection: str,
+width: int, height: int, hidden: collections.abc.Sequence[int] = ..., options: TraceOptions = ...) ->
+NDArray[numpy.float32])">(),
+          R"(The radiance that arrives at `origin` in any projection, (faces, height, width, 3) or, of
+one face, (height, width, 3): what EnvMap.from_array takes. The rays go straight through the texels of
+the projection and pass through the objects in `hidden`, whose shadows and reflections on other things
+remain.)")
+      .def(
+          "capture_cube",
+          [](const Tracer& tracer, glm::vec3 origin, int size, const std::vector<int>& hidden,
+             const TraceOptions& options) {
+            Image image;
+            {
+              nb::gil_scoped_release released;
+              image = tracer.capture_cube(origin, size, hidden, options);
+            }
+            const auto side = static_cast<std::size_t>(size);
+            return to_numpy(std::move(image.pixels), {6, side, side, 3});
+          },
+          nb::arg("origin"), nb::arg("size"), nb::arg("hidden") = std::vector<int>{},
+          nb::arg("options") = TraceOptions{},
+          signature<R"(def capture_cube(self, origin: collections.abc.Sequence[float], size: int,
+hidden: collections.abc.Sequence[int] = ..., options: TraceOptions = ...) -> NDArray[numpy.float32])">(),
+          R"(Cube map (6, size, size, 3) of the radiance that arrives at `origin`, the rays passing
+through the objects in `hidden`, whose shadows and reflections on other things remain.)");
+}
 
-void bind_tracer(nb::module_& m) {
-  nb::class_<Camera> camera_class(m, "Camera", "A pinhole camera. Pixel (0,0) is the top left one.");
-  camera_class
+void bind_gathering(nb::class_<Tracer>& tracer) {
+  tracer
+      .def(
+          "intersect",
+          [](const Tracer& tracer, PointArray origins, PointArray directions,
+             const std::vector<int>& hidden) {
+            std::vector<RayHit> hits;
+            {
+              nb::gil_scoped_release released;
+              hits = tracer.intersect(points(origins), points(directions), hidden);
+            }
+            std::vector<float> distance;
+            std::vector<std::int32_t> object;
+            std::vector<glm::vec3> normal;
+            for (const RayHit& hit : hits) {
+              distance.push_back(hit.distance);
+              object.push_back(hit.object);
+              normal.push_back(hit.normal);
+            }
+            const std::size_t count = hits.size();
+            return nb::make_tuple(to_numpy(std::move(distance), {count}),
+                                  to_numpy(std::move(object), {count}), vectors_to_numpy(std::move(normal)));
+          },
+          nb::arg("origins"), nb::arg("directions"), nb::arg("hidden") = std::vector<int>{},
+          signature<R"(def intersect(self, origins: NDArray[numpy.float32],
+directions: NDArray[numpy.float32], hidden: collections.abc.Sequence[int] = ...) ->
+tuple[NDArray[numpy.float32], NDArray[numpy.int32], NDArray[numpy.float32]])">(),
+          R"(First hits of rays, arrays of shape (n, 3), through the objects in `hidden`. Returns the
+distance in metres (n,), inf for a miss; the object (n,), -1 for a miss or a light; the geometric normal
+(n, 3).)")
+      .def(
+          "intersect_distance",
+          [](const Tracer& tracer, PointArray origins, PointArray directions,
+             const std::vector<int>& hidden) {
+            const std::size_t count = origins.shape(0);
+            std::vector<float> distance(count);
+            std::vector<std::int32_t> object(count);
+            {
+              nb::gil_scoped_release released;
+              tracer.intersect(points(origins), points(directions), hidden, distance, object);
+            }
+            return nb::make_tuple(to_numpy(std::move(distance), {count}),
+                                  to_numpy(std::move(object), {count}));
+          },
+          nb::arg("origins"), nb::arg("directions"), nb::arg("hidden") = std::vector<int>{},
+          signature<R"(def intersect_distance(self, origins: NDArray[numpy.float32],
+directions: NDArray[numpy.float32], hidden: collections.abc.Sequence[int] = ...) ->
+tuple[NDArray[numpy.float32], NDArray[numpy.int32]])">(),
+          "Distance and object of `intersect` alone, which is faster.")
+      .def(
+          "vertex_irradiance",
+          [](const Tracer& tracer, int object, int rays, std::uint64_t seed) {
+            std::vector<glm::vec3> irradiance;
+            {
+              nb::gil_scoped_release released;
+              irradiance = tracer.vertex_irradiance(object, rays, seed);
+            }
+            return vectors_to_numpy(std::move(irradiance));
+          },
+          nb::arg("object"), nb::arg("rays") = 256, nb::arg("seed") = 0,
+          signature<R"(def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...) ->
+NDArray[numpy.float32])">(),
+          "Irradiance at every vertex of an object's front, (vertices, 3), all light included.");
+}
+
+void bind_camera(nb::module_& m) {
+  nb::class_<Camera> camera(m, "Camera", "A pinhole camera. Pixel (0,0) is the top left one.");
+  camera
       .def(
           "__init__",
           [](Camera* self, glm::vec3 eye, glm::vec3 target, glm::vec3 up, float vertical_fov_degrees,
@@ -57,8 +193,10 @@ void bind_tracer(nb::module_& m) {
                ", vertical_fov_degrees=" + text_of(c.vertical_fov_degrees) +
                ", width=" + std::to_string(c.width) + ", height=" + std::to_string(c.height) + ")";
       });
-  pickle(camera_class, {"eye", "target", "up", "vertical_fov_degrees", "width", "height"});
+  pickle(camera, {"eye", "target", "up", "vertical_fov_degrees", "width", "height"});
+}
 
+void bind_tracer_options(nb::module_& m) {
   nb::class_<TracerOptions> tracer_options(m, "TracerOptions", "What is decided once per scene.");
   tracer_options
       .def(
@@ -76,12 +214,13 @@ void bind_tracer(nb::module_& m) {
       .def_rw("cache_bounces", &TracerOptions::cache_bounces, "Diffuse bounces of the cache, 1 to 16.")
       .def_rw("seed", &TracerOptions::seed, "Of the cache.");
   record(tracer_options, {"indirect", "cache_rays", "cache_bounces", "seed"});
+}
 
+void bind_shell_rule(nb::module_& m) {
   nb::class_<ShellRule> shell_rule(
       m, "ShellRule",
-      "What one shell of a reflector's environment holds: the things that a reflected ray "
-      "meets first, as the\nfirst rule of a list says that they match. The last rule takes "
-      "the rest, and the background.");
+      R"(What one shell of a reflector's environment holds: the things that a reflected ray meets first,
+as the first rule of a list says that they match. The last rule takes the rest, and the background.)");
   shell_rule
       .def(
           "__init__",
@@ -103,7 +242,9 @@ void bind_tracer(nb::module_& m) {
   m.def("default_shell_rules", &default_shell_rules,
         "`local`, the reflector itself, and `distant`, the rest.");
   m.attr("MOST_SHELLS") = kMostShells;
+}
 
+void bind_trace_options(nb::module_& m) {
   nb::class_<TraceOptions> trace_options(m, "TraceOptions", "What is decided per image.");
   trace_options
       .def(
@@ -135,8 +276,8 @@ void bind_tracer(nb::module_& m) {
               "Diffuse bounces of IndirectLight.path, 0 to 64.")
       .def_rw("seed", &TraceOptions::seed)
       .def_rw("noise", &TraceOptions::noise,
-              "0, or the standard error of a pixel's displayed value (sRGB, 0 to 1) for which trace_layers "
-              "takes more\nsamples where they are needed.")
+              R"(0, or the standard error of a pixel's displayed value (sRGB, 0 to 1) for which
+trace_layers takes more samples where they are needed.)")
       .def_rw("most_samples_per_pixel", &TraceOptions::most_samples_per_pixel,
               "Of trace_layers with `noise`, 1 to 65536.")
       .def_rw("shells", &TraceOptions::shells,
@@ -152,7 +293,9 @@ void bind_tracer(nb::module_& m) {
           "x, y, width, height of the part of the image to trace, in pixels; of no size: everything.");
   record(trace_options, {"samples_per_pixel", "max_specular_depth", "max_diffuse_depth", "seed", "noise",
                          "most_samples_per_pixel", "shells", "window"});
+}
 
+void bind_traces(nb::module_& m) {
   nb::class_<BeautyTrace>(m, "BeautyTrace", "An image that was traced until its noise was below a limit.")
       .def_prop_ro(
           "image",
@@ -194,12 +337,15 @@ void bind_tracer(nb::module_& m) {
           [](nb::handle self) {
             return scalars_view(nb::cast<const LayerTrace&>(self).display_variance, self);
           },
-          "(height * width,): squared standard error of the displayed value (sRGB, 0 to 1) of the mean of a "
-          "pixel's\ncovered samples, estimated.");
+          R"((height * width,): squared standard error of the displayed value (sRGB, 0 to 1) of the mean
+of a pixel's covered samples, estimated.)");
+}
 
-  nb::class_<Tracer>(
+void bind_tracer_class(nb::module_& m) {
+  nb::class_<Tracer> tracer(
       m, "Tracer",
-      "A scene made ready for tracing. Same arguments give the same bits on any number of threads.")
+      "A scene made ready for tracing. Same arguments give the same bits on any number of threads.");
+  tracer
       .def(
           "__init__",
           [](Tracer* self, const Scene& scene, const TracerOptions& options) {
@@ -207,8 +353,8 @@ void bind_tracer(nb::module_& m) {
             new (self) Tracer(scene, options);
           },
           nb::arg("scene"), nb::arg("options") = TracerOptions{},
-          "Copies the scene, builds the acceleration structure and, with IndirectLight.cached, gathers the "
-          "cache.")
+          R"(Copies the scene, builds the acceleration structure and, with IndirectLight.cached, gathers
+the cache.)")
       .def_prop_ro(
           "scene", [](const Tracer& tracer) -> const Scene& { return tracer.scene(); },
           nb::rv_policy::reference_internal)
@@ -223,159 +369,35 @@ void bind_tracer(nb::module_& m) {
             return image_to_numpy(std::move(image));
           },
           nb::arg("camera"), nb::arg("options") = TraceOptions{},
-          nb::sig("def trace_beauty(self, camera: Camera, options: TraceOptions = ...) -> "
-                  "NDArray[numpy.float32]"),
+          signature<R"(def trace_beauty(self, camera: Camera, options: TraceOptions = ...) ->
+NDArray[numpy.float32])">(),
           "Image of everything: (height, width, 3) float32 radiance.")
-      .def(
-          "trace_beauty_to_noise", &Tracer::trace_beauty_to_noise, nb::arg("camera"), nb::arg("noise"),
-          nb::arg("options") = TraceOptions{}, nb::call_guard<nb::gil_scoped_release>(),
-          nb::sig(
-              "def trace_beauty_to_noise(self, camera: Camera, noise: float, options: TraceOptions = ...) -> "
-              "BeautyTrace"),
-          "The same with as many samples as each tile of 16² pixels needs for a relative standard error of "
-          "`noise`, at\nmost options.samples_per_pixel.")
+      .def("trace_beauty_to_noise", &Tracer::trace_beauty_to_noise, nb::arg("camera"), nb::arg("noise"),
+           nb::arg("options") = TraceOptions{}, nb::call_guard<nb::gil_scoped_release>(),
+           signature<R"(def trace_beauty_to_noise(self, camera: Camera, noise: float,
+options: TraceOptions = ...) -> BeautyTrace)">(),
+           R"(The same with as many samples as each tile of 16² pixels needs for a relative standard error
+of `noise`, at most options.samples_per_pixel.)")
       .def("trace_layers",
            nb::overload_cast<const Camera&, int, const TraceOptions&>(&Tracer::trace_layers, nb::const_),
            nb::arg("camera"), nb::arg("reflector"), nb::arg("options") = TraceOptions{},
            nb::call_guard<nb::gil_scoped_release>(),
-           nb::sig("def trace_layers(self, camera: Camera, reflector: int, options: TraceOptions = ...) -> "
-                   "LayerTrace"),
-           "Layers of object number `reflector`, whose material must be specular.")
-      .def(
-          "trace_layers",
-          [](const Tracer& tracer, const Camera& camera, const std::vector<int>& reflectors,
-             const TraceOptions& options) { return tracer.trace_layers(camera, reflectors, options); },
-          nb::arg("camera"), nb::arg("reflectors"), nb::arg("options") = TraceOptions{},
-          nb::call_guard<nb::gil_scoped_release>(),
-          nb::sig("def trace_layers(self, camera: Camera, reflectors: collections.abc.Sequence[int], "
-                  "options: TraceOptions = ...) -> list[LayerTrace]"),
-          "Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as "
-          "trace_layers gives.")
-      .def(
-          "trace_visibility",
-          [](const Tracer& tracer, const Camera& camera, int reflector, const TraceOptions& options,
-             const std::vector<glm::vec2>& places) {
-            const nb::gil_scoped_release released;
-            return tracer.trace_visibility(camera, reflector, options, places);
-          },
-          nb::arg("camera"), nb::arg("reflector"), nb::arg("options") = TraceOptions{},
-          nb::arg("places") = std::vector<glm::vec2>{},
-          nb::sig("def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ..., "
-                  "places: "
-                  "collections.abc.Sequence[collections.abc.Sequence[float]] = ()) -> SurfaceSamples"),
-          "Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.\n"
-          "With `places` (x, y in [0, 1) from the pixel's top left corner) the rays go through those places "
-          "of "
-          "every\npixel instead, as a renderer's lookups do (RunTimeModel.places).")
-      .def(
-          "capture",
-          [](const Tracer& tracer, glm::vec3 origin, const std::string& projection, int width, int height,
-             const std::vector<int>& hidden, const TraceOptions& options) {
-            const Projection p = parse_projection(projection);
-            Image image;
-            {
-              nb::gil_scoped_release released;
-              image = tracer.capture(origin, p, width, height, hidden, options);
-            }
-            const auto faces = static_cast<std::size_t>(face_count(p));
-            const auto rows = static_cast<std::size_t>(height);
-            const auto columns = static_cast<std::size_t>(width);
-            return faces > 1 ? to_numpy(std::move(image.pixels), {faces, rows, columns, 3})
-                             : to_numpy(std::move(image.pixels), {rows, columns, 3});
-          },
-          nb::arg("origin"), nb::arg("projection"), nb::arg("width"), nb::arg("height"),
-          nb::arg("hidden") = std::vector<int>{}, nb::arg("options") = TraceOptions{},
-          nb::sig("def capture(self, origin: collections.abc.Sequence[float], projection: str, width: int, "
-                  "height: int, hidden: collections.abc.Sequence[int] = ..., options: TraceOptions = ...) -> "
-                  "NDArray[numpy.float32]"),
-          "The radiance that arrives at `origin` in any projection, (faces, height, width, 3) or, of one "
-          "face, "
-          "(height,\nwidth, 3): what EnvMap.from_array takes. The rays go straight through the texels of the "
-          "projection and pass\nthrough the objects in `hidden`, whose shadows and reflections on other "
-          "things "
-          "remain.")
-      .def(
-          "capture_cube",
-          [](const Tracer& tracer, glm::vec3 origin, int size, const std::vector<int>& hidden,
-             const TraceOptions& options) {
-            Image image;
-            {
-              nb::gil_scoped_release released;
-              image = tracer.capture_cube(origin, size, hidden, options);
-            }
-            const auto side = static_cast<std::size_t>(size);
-            return to_numpy(std::move(image.pixels), {6, side, side, 3});
-          },
-          nb::arg("origin"), nb::arg("size"), nb::arg("hidden") = std::vector<int>{},
-          nb::arg("options") = TraceOptions{},
-          nb::sig("def capture_cube(self, origin: collections.abc.Sequence[float], size: int, "
-                  "hidden: collections.abc.Sequence[int] = ..., options: TraceOptions = ...) -> "
-                  "NDArray[numpy.float32]"),
-          "Cube map (6, size, size, 3) of the radiance that arrives at `origin`, the rays passing through "
-          "the objects\n"
-          "in `hidden`, whose shadows and reflections on other things remain.")
-      .def(
-          "intersect",
-          [](const Tracer& tracer, PointArray origins, PointArray directions,
-             const std::vector<int>& hidden) {
-            std::vector<RayHit> hits;
-            {
-              nb::gil_scoped_release released;
-              hits = tracer.intersect(points(origins), points(directions), hidden);
-            }
-            std::vector<float> distance;
-            std::vector<std::int32_t> object;
-            std::vector<glm::vec3> normal;
-            for (const RayHit& hit : hits) {
-              distance.push_back(hit.distance);
-              object.push_back(hit.object);
-              normal.push_back(hit.normal);
-            }
-            const std::size_t count = hits.size();
-            return nb::make_tuple(to_numpy(std::move(distance), {count}),
-                                  to_numpy(std::move(object), {count}), vectors_to_numpy(std::move(normal)));
-          },
-          nb::arg("origins"), nb::arg("directions"), nb::arg("hidden") = std::vector<int>{},
-          nb::sig("def intersect(self, origins: NDArray[numpy.float32], directions: NDArray[numpy.float32], "
-                  "hidden: collections.abc.Sequence[int] = ...) -> tuple[NDArray[numpy.float32], "
-                  "NDArray[numpy.int32], NDArray[numpy.float32]]"),
-          "First hits of rays, arrays of shape (n, 3), through the objects in `hidden`. Returns the distance "
-          "in metres\n"
-          "(n,), inf for a miss; the object (n,), -1 for a miss or a light; the geometric normal "
-          "(n, 3).")
-      .def(
-          "intersect_distance",
-          [](const Tracer& tracer, PointArray origins, PointArray directions,
-             const std::vector<int>& hidden) {
-            const std::size_t count = origins.shape(0);
-            std::vector<float> distance(count);
-            std::vector<std::int32_t> object(count);
-            {
-              nb::gil_scoped_release released;
-              tracer.intersect(points(origins), points(directions), hidden, distance, object);
-            }
-            return nb::make_tuple(to_numpy(std::move(distance), {count}),
-                                  to_numpy(std::move(object), {count}));
-          },
-          nb::arg("origins"), nb::arg("directions"), nb::arg("hidden") = std::vector<int>{},
-          nb::sig("def intersect_distance(self, origins: NDArray[numpy.float32], directions: "
-                  "NDArray[numpy.float32], hidden: collections.abc.Sequence[int] = ...) -> "
-                  "tuple[NDArray[numpy.float32], NDArray[numpy.int32]]"),
-          "Distance and object of `intersect` alone, which is faster.")
-      .def(
-          "vertex_irradiance",
-          [](const Tracer& tracer, int object, int rays, std::uint64_t seed) {
-            std::vector<glm::vec3> irradiance;
-            {
-              nb::gil_scoped_release released;
-              irradiance = tracer.vertex_irradiance(object, rays, seed);
-            }
-            return vectors_to_numpy(std::move(irradiance));
-          },
-          nb::arg("object"), nb::arg("rays") = 256, nb::arg("seed") = 0,
-          nb::sig("def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...) -> "
-                  "NDArray[numpy.float32]"),
-          "Irradiance at every vertex of an object's front, (vertices, 3), all light included.");
+           signature<R"(def trace_layers(self, camera: Camera, reflector: int,
+options: TraceOptions = ...) -> LayerTrace)">(),
+           "Layers of object number `reflector`, whose material must be specular.");
+  bind_tracing(tracer);
+  bind_gathering(tracer);
+}
+
+}  // namespace
+
+void bind_tracer(nb::module_& m) {
+  bind_camera(m);
+  bind_tracer_options(m);
+  bind_shell_rule(m);
+  bind_trace_options(m);
+  bind_traces(m);
+  bind_tracer_class(m);
 }
 
 }  // namespace mirrorbake::bindings

@@ -8,6 +8,7 @@ void bind_proxy(nb::module_& m);
 void bind_envmap(nb::module_& m);
 void bind_image(nb::module_& m);
 void bind_material(nb::module_& m);
+void bind_mesh(nb::module_& m);
 void bind_scene(nb::module_& m);
 void bind_surface(nb::module_& m);
 void bind_tracer(nb::module_& m);
@@ -28,6 +29,7 @@ NB_MODULE(_core, m) {
   bind_proxy(m);
   bind_image(m);
   bind_material(m);
+  bind_mesh(m);
   bind_scene(m);
   bind_surface(m);
   bind_tracer(m);

@@ -29,10 +29,9 @@ struct Input {
         ->required();
   }
   void add_details(CLI::App& app, const std::string& whose = "the input") {
-    app.add_option("--from", projection,
-                   "projection of " + whose +
-                       ": cube, latlong, equal_area, dual_paraboloid, sphere_map, angular, fisheye:DEGREES "
-                       "(default: by the shape of the image)");
+    app.add_option(
+        "--from", projection,
+        "projection of " + whose + ": " + projection_names() + " (default: by the shape of the image)");
     app.add_option("--from-layout", layout,
                    "how faces share the image: strip, column, grid, cross, vertical_cross")
         ->capture_default_str();

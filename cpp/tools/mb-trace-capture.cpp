@@ -23,10 +23,7 @@ class Capture final : public Command {
     for (const char* name : {"--crop", "--camera", "--eye", "--target", "--fov"}) {
       app->remove_option(app->get_option(name));
     }
-    app->add_option(
-           "--to", projection_,
-           "projection: cube, latlong, equal_area, dual_paraboloid, sphere_map, angular, fisheye:DEGREES")
-        ->capture_default_str();
+    app->add_option("--to", projection_, "projection: " + projection_names())->capture_default_str();
     app->add_option("--origin", origin_, "x y z of the point to look from, metres (default: 0 0 0)")
         ->type_size(3)
         ->expected(1);

@@ -87,20 +87,13 @@ EnvironmentLight white_sky() {
   return sky;
 }
 
-// Panoramas that were scaled down with a sharpening filter undershoot beside their lights.
 Image load_sky(const std::string& path, const ImageChoice& choice) {
-  Image panorama = load_panorama(path, choice);
-  std::size_t negative = 0;
-  for (float& value : panorama.pixels) {
-    if (!std::isfinite(value)) throw FileError(path, "has values that are not finite, expected radiance");
-    if (value >= 0.0F) continue;
-    value = 0.0F;
-    ++negative;
+  Panorama panorama = load_panorama(path, choice);
+  if (panorama.negative > 0) {
+    std::cerr << "mb-trace: warning: " << path << ": " << panorama.negative
+              << " negative values were taken as 0\n";
   }
-  if (negative > 0) {
-    std::cerr << "mb-trace: warning: " << path << ": " << negative << " negative values were taken as 0\n";
-  }
-  return panorama;
+  return std::move(panorama.image);
 }
 
 Source load_source(const std::string& path) {

@@ -55,13 +55,15 @@ class Proxy:
     @staticmethod
     def box(centre: Sequence[float], half_extent: Sequence[float], origin: Sequence[float] | None = None, axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        A box. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for unusable values.
+        A box. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for
+        unusable values.
         """
 
     @staticmethod
     def ellipsoid(centre: Sequence[float], radii: Sequence[float], origin: Sequence[float] | None = None, axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        An ellipsoid. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for unusable values.
+        An ellipsoid. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument
+        for unusable values.
         """
 
     @staticmethod
@@ -71,7 +73,8 @@ class Proxy:
     @staticmethod
     def hemisphere(centre: Sequence[float], radius: float, origin: Sequence[float], axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie inside, above the floor.
+        The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie
+        inside, above the floor.
         """
 
     @property
@@ -188,28 +191,35 @@ def mirror_lookups(proxies: Sequence[Proxy], eye: Sequence[float], positions: An
 
 def area_weighted_centroid(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> Sequence[float]:
     """
-    Area-weighted mean of the triangles' centroids: the origin of an object's maps ([PEM] section 4).
+    Area-weighted mean of the triangles' centroids: the origin of an object's maps ([PEM] section
+    4).
 
-    `positions` (n, 3) in metres, `triangles` (m, 3) indices. Returns (x, y, z). Raises InvalidArgument for indices out of range and for meshes without area.
+    `positions` (n, 3) in metres, `triangles` (m, 3) indices. Returns (x, y, z). Raises InvalidArgument for
+    indices out of range and for meshes without area.
     """
 
 def fit_ellipsoid(points: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], centre: Sequence[float], origin: Sequence[float] | None = None) -> Proxy:
     """
-    Minimum-volume axis-aligned ellipsoid around `centre` that encloses every point, to a relative volume of 1e-6.
+    Minimum-volume axis-aligned ellipsoid around `centre` that encloses every point, to a relative
+    volume of 1e-6.
 
-    `points` (n, 3). `origin` of the returned Proxy defaults to `centre`. Flat input gets radii of at least 1e-4 of the largest extent. Raises InvalidArgument if all points lie at the centre.
+    `points` (n, 3). `origin` of the returned Proxy defaults to `centre`. Flat input gets radii of at least
+    1e-4 of the largest extent. Raises InvalidArgument if all points lie at the centre.
     """
 
 def fit_box_mean_distance(hits: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], origin: Sequence[float], floor: float) -> Proxy:
     """
-    Box by [PEM] section 4: bottom on the plane y = `floor`, the other sides at the mean distance of the hits on that side.
+    Box by [PEM] section 4: bottom on the plane y = `floor`, the other sides at the mean distance of
+    the hits on that side.
 
-    `hits` (n, 3): where rays from around the object meet the surroundings. Returns a Proxy with the given origin.
+    `hits` (n, 3): where rays from around the object meet the surroundings. Returns a Proxy with the given
+    origin.
     """
 
 def fit_box_robust(hits: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], origin: Sequence[float]) -> Proxy:
     """
-    Axis-aligned box around `origin` that fits the hits best, by robust (Huber) least squares of their distances to its surface.
+    Axis-aligned box around `origin` that fits the hits best, by robust (Huber) least squares of
+    their distances to its surface.
 
     `hits` (n, 3). Returns a Proxy with the given origin.
     """
@@ -292,7 +302,8 @@ def choose_proxy(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 
 
 def hull_triangles(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], tolerance: float = 0.0001) -> NDArray[numpy.uint8]:
     """
-    1 for every triangle that lies on the mesh's convex hull, else 0; see mirrorbake.proxy.hull_triangles.
+    1 for every triangle that lies on the mesh's convex hull, else 0; see
+    mirrorbake.proxy.hull_triangles.
     """
 
 class SaveReport:
@@ -314,15 +325,15 @@ class SaveReport:
 
 def load_image(path: str | os.PathLike[str]) -> tuple[NDArray[numpy.float32], list[str]]:
     """
-    Read an EXR, HDR, TIFF, PNG or JPEG as scene-linear float32 of shape (height, width, channels), with the
-    names of the channels. Integer formats are decoded from sRGB. Raises FileError.
+    Read an EXR, HDR, TIFF, PNG or JPEG as scene-linear float32 of shape (height, width, channels),
+    with the names of the channels. Integer formats are decoded from sRGB. Raises FileError.
     """
 
 def save_image(path: str | os.PathLike[str], pixels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], channels: Sequence[str] | None = None, format: Literal['automatic', 'half', 'float32', 'uint8', 'uint16'] = 'automatic') -> SaveReport:
     """
-    Write scene-linear pixels of shape (height, width, channels) atomically; the extension of the path decides the
-    format. `channels` names the channels (default Y, YA, RGB or RGBA). `format`: automatic, half, float32, uint8
-    or uint16. Raises FileError and InvalidArgument.
+    Write scene-linear pixels of shape (height, width, channels) atomically; the extension of the
+    path decides the format. `channels` names the channels (default Y, YA, RGB or RGBA). `format`: automatic,
+    half, float32, uint8 or uint16. Raises FileError and InvalidArgument.
     """
 
 def set_texture_cache_bytes(bytes: int) -> None:
@@ -332,9 +343,9 @@ def set_texture_cache_bytes(bytes: int) -> None:
 
 class TextureReference:
     """
-    A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as of
-    KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation` radians
-    about (0, 0), then moved.
+    A texture of a scene, by its index (−1: none), and the transform of the texture coordinates as
+    of KHR_texture_transform, whose v counts downwards: scaled, turned counter-clockwise by `rotation`
+    radians about (0, 0), then moved.
     """
 
     def __init__(self, texture: int = -1, offset: Sequence[float] = (0.0, 0.0), scale: Sequence[float] = (1.0, 1.0), rotation: float = 0.0) -> None: ...
@@ -564,10 +575,10 @@ class TriangleMesh:
 
     def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, parts: Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, colors: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None) -> None:
         """
-        Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from outside, unit
-        normals (V, 3) (default: flat shading), uvs (V, 2) with v up, the part of each triangle (T,), and colours
-        (V, 3) in [0, 1], linear, that multiply the material's albedo. Raises
-        InvalidArgument for anything not finite, indices out of range or a mesh without area.
+        Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from
+        outside, unit normals (V, 3) (default: flat shading), uvs (V, 2) with v up, the part of each triangle
+        (T,), and colours (V, 3) in [0, 1], linear, that multiply the material's albedo. Raises InvalidArgument
+        for anything not finite, indices out of range or a mesh without area.
         """
 
     @property
@@ -605,8 +616,9 @@ def bounds(mesh: TriangleMesh) -> tuple[Sequence[float], Sequence[float]]:
 
 def make_teapot(subdivisions: int = 25, height: float = 0.15000000596046448) -> TriangleMesh:
     """
-    The Utah teapot of 32 Bezier patches, `subdivisions`² × 2 triangles each (1 to 512; 25 gives the 40,000 of
-    [PEM] §6), `height` metres high, standing on y = 0 with the spout along +X. Parts: 0 body, 1 lid.
+    The Utah teapot of 32 Bezier patches, `subdivisions`² × 2 triangles each (1 to 512; 25 gives
+    the 40,000 of [PEM] §6), `height` metres high, standing on y = 0 with the spout along +X. Parts: 0 body,
+    1 lid.
     """
 
 def teapot_part_names() -> list[str]:
@@ -636,10 +648,21 @@ def make_rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[floa
 
 def load_mesh(path: str | os.PathLike[str], *, origin: Sequence[float] = [0.0, 0.0, 0.0]) -> TriangleMesh:
     """
-    Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms applied
-    (instances become copies) and missing vertex normals made by angle-weighted averaging. `origin`: as of
-    load_scene. Raises FileError if the file is missing, corrupt, empty or refers to files outside its
+    Every triangle of an .obj, .gltf or .glb file as one mesh of one part, with node transforms
+    applied (instances become copies) and missing vertex normals made by angle-weighted averaging. `origin`:
+    as of load_scene. Raises FileError if the file is missing, corrupt, empty or refers to files outside its
     directory.
+    """
+
+def winding_number(mesh: TriangleMesh, point: Sequence[float]) -> float:
+    """
+    How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van
+    Oosterom and Strackee 1983). Exactly 0 outside of the bounding box.
+    """
+
+def encloses(mesh: TriangleMesh, point: Sequence[float]) -> bool:
+    """
+    Whether a point, such as an eye, lies inside of a body: whether it winds about it more than half.
     """
 
 class Visibility(enum.Flag):
@@ -658,21 +681,10 @@ class Visibility(enum.Flag):
 
     all = 7
 
-def winding_number(mesh: TriangleMesh, point: Sequence[float]) -> float:
-    """
-    How often a mesh winds about a point: 1 inside of a closed mesh, 0 outside, else between (van
-    Oosterom and Strackee 1983). Exactly 0 outside of the bounding box.
-    """
-
-def encloses(mesh: TriangleMesh, point: Sequence[float]) -> bool:
-    """
-    Whether a point, such as an eye, lies inside of a body: whether it winds about it more than half.
-    """
-
 class Scene:
     """
-    Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours and
-    radiance are scene-linear with Rec.709 primaries. The add_ functions return the new thing's index.
+    Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours
+    and radiance are scene-linear with Rec.709 primaries. The add_ functions return the new thing's index.
     """
 
     def __init__(self) -> None: ...
@@ -689,14 +701,14 @@ class Scene:
 
     def add_texture_file(self, path: str | os.PathLike[str], wrap_u: Literal['repeat', 'clamp', 'mirror'] = 'repeat', wrap_v: Literal['repeat', 'clamp', 'mirror'] = 'repeat', transfer: Literal['automatic', 'srgb', 'linear'] = 'automatic') -> int:
         """
-        Add a texture whose texels are read from an image file when they are needed, and kept in a cache
-        of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].
+        Add a texture whose texels are read from an image file when they are needed, and kept in a
+        cache of bounded size. Raises FileError if the file is missing, damaged or has values outside [0, 1].
         """
 
     def texture_pixels(self, texture: int) -> NDArray[numpy.float32]:
         """
-        Copy of a texture's texels, (height, width, 3), or (height, width, 1) for one channel that stands
-        for all three; scene-linear, row 0 at the top. Raises FileError if its file has changed.
+        Copy of a texture's texels, (height, width, 3), or (height, width, 1) for one channel that
+        stands for all three; scene-linear, row 0 at the top. Raises FileError if its file has changed.
         """
 
     def texture_wrap(self, texture: int) -> tuple[Literal['repeat', 'clamp', 'mirror'], Literal['repeat', 'clamp', 'mirror']]:
@@ -707,8 +719,8 @@ class Scene:
 
     def add_object(self, name: str, mesh: TriangleMesh, material: int, part_names: Sequence[str] = [], visibility: Visibility = Visibility.all, part_materials: Sequence[int] = []) -> int:
         """
-        Add a copy of a mesh, in world space, with the material of that index. `part_names` names its parts, if it
-        has more than one; `part_materials` gives each a material of its own.
+        Add a copy of a mesh, in world space, with the material of that index. `part_names` names
+        its parts, if it has more than one; `part_materials` gives each a material of its own.
         """
 
     def add_rectangle_light(self, corner: Sequence[float], edge_u: Sequence[float], edge_v: Sequence[float], radiance: Sequence[float]) -> int:
@@ -724,21 +736,21 @@ class Scene:
 
     def add_directional_light(self, direction: Sequence[float], irradiance: Sequence[float]) -> int:
         """
-        Add parallel light that travels along the unit vector `direction` and gives a surface that faces it
-        `irradiance` W m⁻².
+        Add parallel light that travels along the unit vector `direction` and gives a surface that
+        faces it `irradiance` W m⁻².
         """
 
     def add_spot_light(self, position: Sequence[float], direction: Sequence[float], intensity: Sequence[float], inner_degrees: float = 0.0, outer_degrees: float = 45.0) -> int:
         """
-        Add a light of `intensity` W sr⁻¹ along the unit vector `direction`: in full up to `inner_degrees` from
-        that axis, falling to 0 at `outer_degrees` (at most 90).
+        Add a light of `intensity` W sr⁻¹ along the unit vector `direction`: in full up to
+        `inner_degrees` from that axis, falling to 0 at `outer_degrees` (at most 90).
         """
 
     def set_environment(self, panorama: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)], scale: float = 1.0, rotation_degrees: float = 0.0) -> None:
         """
-        Surround the scene with a latitude-longitude panorama of radiance, shape (height, width, 3): its centre looks
-        along −Z, +X is to the right of the centre, +Y is the top row. It is multiplied with `scale` and turned
-        counter-clockwise about +Y, seen from above.
+        Surround the scene with a latitude-longitude panorama of radiance, shape (height, width, 3):
+        its centre looks along −Z, +X is to the right of the centre, +Y is the top row. It is multiplied with
+        `scale` and turned counter-clockwise about +Y, seen from above.
         """
 
     def add_materials(self, other: Scene) -> int:
@@ -748,8 +760,8 @@ class Scene:
 
     def join_objects(self, most_parts: int) -> tuple[TriangleMesh, list[str], list[int]]:
         """
-        All objects in one mesh: (mesh, part names, index of each part's material). A part is an object, or, if
-        there are more than `most_parts`, what is of one material.
+        All objects in one mesh: (mesh, part names, index of each part's material). A part is an
+        object, or, if there are more than `most_parts`, what is of one material.
         """
 
     @property
@@ -842,24 +854,24 @@ class LoadedScene:
 def load_scene(path: str | os.PathLike[str], *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, cache_textures_above: int = 67108864, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0, origin: Sequence[float] = [0.0, 0.0, 0.0]) -> LoadedScene:
     """
     Read a scene from an .obj (with its .mtl), .gltf or .glb file: one object per node and material,
-    materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in
-    memory are read through the cache of texture files. glTF's candela, lux and nits are divided by
-    `luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's
-    zero, before positions are rounded to float32. Raises FileError if a file is missing, corrupt, beyond
-    a limit or refers to files outside its directory.
+    materials, textures, lights and cameras. Image files larger than `cache_textures_above` bytes in memory
+    are read through the cache of texture files. glTF's candela, lux and nits are divided by
+    `luminous_efficacy` (lumens per watt). The place `origin` of the file's world becomes the scene's zero,
+    before positions are rounded to float32. Raises FileError if a file is missing, corrupt, beyond a limit
+    or refers to files outside its directory.
     """
 
 def referenced_files(path: str | os.PathLike[str], content: Literal['mesh', 'scene']) -> list[str]:
     """
-    The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF file and,
-    for a scene, its images, or the material libraries of an OBJ file and their images. Absolute, each once,
-    not those that do not exist. Raises FileError if `path` or a library is missing or corrupt.
+    The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF
+    file and, for a scene, its images, or the material libraries of an OBJ file and their images. Absolute,
+    each once, not those that do not exist. Raises FileError if `path` or a library is missing or corrupt.
     """
 
 def make_room() -> Scene:
     """
-    The built-in furnished room. The table's top is the plane y = 0 with its centre at the origin; the reflector,
-    which is not part of it, stands there.
+    The built-in furnished room. The table's top is the plane y = 0 with its centre at the origin;
+    the reflector, which is not part of it, stands there.
     """
 
 class ShellLight:
@@ -882,8 +894,9 @@ class ShellLight:
 
 class SurfaceSamples:
     """
-    Where the samples of an image's pixels first meet the reflector: one entry per sample that sees it, ordered by
-    pixel, then by sample. All arrays are read-only views; `diffuse` and `shells` are empty when no light was traced.
+    Where the samples of an image's pixels first meet the reflector: one entry per sample that sees
+    it, ordered by pixel, then by sample. All arrays are read-only views; `diffuse` and `shells` are empty
+    when no light was traced.
     """
 
     @property
@@ -977,9 +990,9 @@ class SurfaceSamples:
 
 def with_vertex_lookups(samples: SurfaceSamples, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], lookups: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> SurfaceSamples:
     """
-    Samples that read a map at coordinates of the vertices, float32 (V, 3), interpolated over every triangle ([PEM]
-    section 5): texture coordinates (u, v, 0), or lookups on a proxy. To be read through Proxy.infinite, since
-    `reflection` is then the lookup itself, of any length.
+    Samples that read a map at coordinates of the vertices, float32 (V, 3), interpolated over every
+    triangle ([PEM] section 5): texture coordinates (u, v, 0), or lookups on a proxy. To be read through
+    Proxy.infinite, since `reflection` is then the lookup itself, of any length.
     """
 
 class RunTimeModel:
@@ -1013,8 +1026,8 @@ class RunTimeModel:
 
 def run_time_model(name: str) -> RunTimeModel:
     """
-    Web (four lookups per pixel on a rotated grid, footprint 1/2, up to 4 taps), Web1 (one lookup) or
-    Reference (16 lookups, footprint 1/4).
+    Web (four lookups per pixel on a rotated grid, footprint 1/2, up to 4 taps), Web1 (one lookup)
+    or Reference (16 lookups, footprint 1/4).
     """
 
 class Camera:
@@ -1109,8 +1122,8 @@ class TracerOptions:
 
 class ShellRule:
     """
-    What one shell of a reflector's environment holds: the things that a reflected ray meets first, as the
-    first rule of a list says that they match. The last rule takes the rest, and the background.
+    What one shell of a reflector's environment holds: the things that a reflected ray meets first,
+    as the first rule of a list says that they match. The last rule takes the rest, and the background.
     """
 
     def __init__(self, name: str, objects: Sequence[int] = [], nearer_than: float = float('inf')) -> None: ...
@@ -1187,8 +1200,8 @@ class TraceOptions:
     @property
     def noise(self) -> float:
         """
-        0, or the standard error of a pixel's displayed value (sRGB, 0 to 1) for which trace_layers takes more
-        samples where they are needed.
+        0, or the standard error of a pixel's displayed value (sRGB, 0 to 1) for which
+        trace_layers takes more samples where they are needed.
         """
 
     @noise.setter
@@ -1273,8 +1286,8 @@ class LayerTrace:
     @property
     def display_variance(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
         """
-        (height * width,): squared standard error of the displayed value (sRGB, 0 to 1) of the mean of a pixel's
-        covered samples, estimated.
+        (height * width,): squared standard error of the displayed value (sRGB, 0 to 1) of the mean
+        of a pixel's covered samples, estimated.
         """
 
 class Tracer:
@@ -1284,7 +1297,8 @@ class Tracer:
 
     def __init__(self, scene: Scene, options: TracerOptions = ...) -> None:
         """
-        Copies the scene, builds the acceleration structure and, with IndirectLight.cached, gathers the cache.
+        Copies the scene, builds the acceleration structure and, with IndirectLight.cached, gathers
+        the cache.
         """
 
     @property
@@ -1295,8 +1309,8 @@ class Tracer:
 
     def trace_beauty_to_noise(self, camera: Camera, noise: float, options: TraceOptions = ...) -> BeautyTrace:
         """
-        The same with as many samples as each tile of 16² pixels needs for a relative standard error of `noise`, at
-        most options.samples_per_pixel.
+        The same with as many samples as each tile of 16² pixels needs for a relative standard error
+        of `noise`, at most options.samples_per_pixel.
         """
 
     @overload
@@ -1306,33 +1320,36 @@ class Tracer:
     @overload
     def trace_layers(self, camera: Camera, reflectors: Sequence[int], options: TraceOptions = ...) -> list[LayerTrace]:
         """
-        Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as trace_layers gives.
+        Layers of several reflectors, which share the rays from the eye: one LayerTrace each, as
+        trace_layers gives.
         """
 
     def trace_visibility(self, camera: Camera, reflector: int, options: TraceOptions = ..., places: Sequence[Sequence[float]] = ()) -> SurfaceSamples:
         """
-        Only the geometry of `reflector`, by the same camera rays as trace_layers with the same options.
-        With `places` (x, y in [0, 1) from the pixel's top left corner) the rays go through those places of every
-        pixel instead, as a renderer's lookups do (RunTimeModel.places).
+        Only the geometry of `reflector`, by the same camera rays as trace_layers with the same
+        options. With `places` (x, y in [0, 1) from the pixel's top left corner) the rays go through those places
+        of every pixel instead, as a renderer's lookups do (RunTimeModel.places).
         """
 
     def capture(self, origin: Sequence[float], projection: str, width: int, height: int, hidden: Sequence[int] = ..., options: TraceOptions = ...) -> NDArray[numpy.float32]:
         """
-        The radiance that arrives at `origin` in any projection, (faces, height, width, 3) or, of one face, (height,
-        width, 3): what EnvMap.from_array takes. The rays go straight through the texels of the projection and pass
-        through the objects in `hidden`, whose shadows and reflections on other things remain.
+        The radiance that arrives at `origin` in any projection, (faces, height, width, 3) or, of
+        one face, (height, width, 3): what EnvMap.from_array takes. The rays go straight through the texels of
+        the projection and pass through the objects in `hidden`, whose shadows and reflections on other things
+        remain.
         """
 
     def capture_cube(self, origin: Sequence[float], size: int, hidden: Sequence[int] = ..., options: TraceOptions = ...) -> NDArray[numpy.float32]:
         """
-        Cube map (6, size, size, 3) of the radiance that arrives at `origin`, the rays passing through the objects
-        in `hidden`, whose shadows and reflections on other things remain.
+        Cube map (6, size, size, 3) of the radiance that arrives at `origin`, the rays passing
+        through the objects in `hidden`, whose shadows and reflections on other things remain.
         """
 
     def intersect(self, origins: NDArray[numpy.float32], directions: NDArray[numpy.float32], hidden: Sequence[int] = ...) -> tuple[NDArray[numpy.float32], NDArray[numpy.int32], NDArray[numpy.float32]]:
         """
-        First hits of rays, arrays of shape (n, 3), through the objects in `hidden`. Returns the distance in metres
-        (n,), inf for a miss; the object (n,), -1 for a miss or a light; the geometric normal (n, 3).
+        First hits of rays, arrays of shape (n, 3), through the objects in `hidden`. Returns the
+        distance in metres (n,), inf for a miss; the object (n,), -1 for a miss or a light; the geometric normal
+        (n, 3).
         """
 
     def intersect_distance(self, origins: NDArray[numpy.float32], directions: NDArray[numpy.float32], hidden: Sequence[int] = ...) -> tuple[NDArray[numpy.float32], NDArray[numpy.int32]]:
@@ -1351,14 +1368,18 @@ def points_from_directions(projection: str, directions: NDArray[numpy.float32]) 
 
 def directions_from_points(projection: str, faces: Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C', device='cpu', writable=False)], points: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
     """
-    Unit directions (n, 3) at positions (n, 2) of faces (n). Raises InvalidArgument for faces that do not exist
-    and positions that are not finite.
+    Unit directions (n, 3) at positions (n, 2) of faces (n). Raises InvalidArgument for faces that
+    do not exist and positions that are not finite.
     """
 
 def texel_solid_angles(projection: str, width: int, height: int) -> NDArray[numpy.float64]:
     """
-    Solid angles in steradians of the texels of a face, float64 of shape (height, width). Faces are alike.
+    Solid angles in steradians of the texels of a face, float64 of shape (height, width). Faces are
+    alike.
     """
+
+def face_count(projection: str) -> int:
+    """Faces of a map: 6 of a cube, 2 of dual paraboloids, else 1."""
 
 def solid_angle_density(projection: str, face: int, x: float, y: float) -> float:
     """
@@ -1367,8 +1388,8 @@ def solid_angle_density(projection: str, face: int, x: float, y: float) -> float
 
 def dual_paraboloid_texture_matrix(frame_from_map: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)], face: int) -> NDArray[numpy.float32]:
     """
-    The 4x4 texture matrix of [EMT] eq. 9-12 for the front (0) or back (1) map: applied to (r, 1) it gives
-    (s q, t q, ., q), t downwards.
+    The 4x4 texture matrix of [EMT] eq. 9-12 for the front (0) or back (1) map: applied to (r, 1) it
+    gives (s q, t q, ., q), t downwards.
     """
 
 class EnvMapLayout:
@@ -1466,8 +1487,8 @@ def add_border(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], d
 
 def sample(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], ddx: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, ddy: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, filter: Literal['nearest', 'bilinear', 'trilinear', 'ewa'] = 'bilinear', level: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)] | None = None, bias: float = 0.0, max_anisotropy: float = 16.0) -> NDArray[numpy.float32]:
     """
-    Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with differentials
-    (n, 3), or trilinear at levels, one or n of them.
+    Values in directions (n, 3): nearest, bilinear, trilinear or ewa, the last two with
+    differentials (n, 3), or trilinear at levels, one or n of them.
     """
 
 def quad_differentials(directions: NDArray[numpy.float32]) -> tuple[NDArray[numpy.float32], NDArray[numpy.float32]]:
@@ -1494,11 +1515,12 @@ def load_envmap(path: str | os.PathLike[str], projection: str | None = None, fac
     Layout, values and names of the channels of a map in an image, KTX2 or DDS file.
     """
 
-def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') -> NDArray[numpy.float32]:
+def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') -> tuple[NDArray[numpy.float32], int]:
     """
-    A map as light: a latlong of R, G and B, (height, width, 3). Cubes are recognised by their shape and resampled;
-    alpha, depth and other channels are left out. `layer` and `part` choose in an EXR file. Raises FileError for
-    a picture that is no panorama.
+    A map as light: a latlong of R, G and B, (height, width, 3), finite and nowhere below 0; and how
+    many values were negative in the file. Cubes are recognised by their shape and resampled; alpha, depth
+    and other channels are left out. `layer` and `part` choose in an EXR file. Raises FileError for a picture
+    that is no panorama, and for values that are not finite.
     """
 
 def save_envmap(path: str | os.PathLike[str], layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], channels: Sequence[str], faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic', format: Literal['automatic', 'half', 'float32', 'uint8', 'uint16'] = 'automatic') -> SaveReport:
@@ -1547,7 +1569,8 @@ def compare_envmaps(layout: EnvMapLayout, values: Annotated[NDArray[numpy.float3
 
 class CubePyramidLayout:
     """
-    Order of the texels of a cube map with all its mip levels: the finest level first, in a level the six faces (+X -X +Y -Y +Z -Z), in a face the rows from the top.
+    Order of the texels of a cube map with all its mip levels: the finest level first, in a level
+    the six faces (+X -X +Y -Y +Z -Z), in a face the rows from the top.
     """
 
     def __init__(self, size: int) -> None:
@@ -1575,13 +1598,14 @@ def build_cube_pyramid(faces: Annotated[NDArray[numpy.float32], dict(shape=(6, N
     """
     All levels of a cube map.
 
-    faces: float32 (6, N, N, C). Returns float32 (texels, C): every level is the mean of the finer one's 2x2 texels weighted by their solid angles ([EMT] section 2.4).
+    faces: float32 (6, N, N, C). Returns float32 (texels, C): every level is the mean of the finer one's 2x2
+    texels weighted by their solid angles ([EMT] section 2.4).
     """
 
 class TexelTopology:
     """
-    How the texels of a map with mip levels lie to each other. Numbered as the values of an EnvMap are: levels from the
-    finest, in a level the faces, in a face the rows from the top.
+    How the texels of a map with mip levels lie to each other. Numbered as the
+    values of an EnvMap are: levels from the finest, in a level the faces, in a face the rows from the top.
     """
 
     def __init__(self, arg: CubePyramidLayout, /) -> None: ...
@@ -1663,14 +1687,14 @@ class RenderingMatrix:
 
 def build_rendering_matrix(samples: SurfaceSamples, part: int, proxy: Proxy, topology: TexelTopology | CubePyramidLayout, run_time: RunTimeModel = ..., triangles: numpy.typing.NDArray[numpy.uint8] | None = None) -> RenderingMatrix:
     """
-    Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups. `triangles`: uint8,
-    0 for each triangle of the reflector whose samples are left out; None: all count.
+    Rendering matrix of the samples that lie on `part` ([PEM] section 4), built from their lookups.
+    `triangles`: uint8, 0 for each triangle of the reflector whose samples are left out; None: all count.
     """
 
 def display_row_weights(matrix: RenderingMatrix, samples_per_pixel: int, target: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], pixel_samples: Sequence[int] = []) -> NDArray[numpy.float32]:
     """
-    Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2, float32 (rows, C).
-    `pixel_samples` as SurfaceSamples has it stands in for samples_per_pixel.
+    Row weights for a target that will be looked at on a display: coverage / (1 + luminance)^2,
+    float32 (rows, C). `pixel_samples` as SurfaceSamples has it stands in for samples_per_pixel.
     """
 
 class SolveOptions:
@@ -1751,41 +1775,41 @@ class SolveReport:
 
 class MapSolver:
     """
-    Regularised least squares for the maps of one or several nodes, seen by one or several views ([PEM] section 4): what
-    all solves share is computed once.
+    Regularised least squares for the maps of one or several nodes, seen by one or
+    several views ([PEM] section 4): what all solves share is computed once.
     """
 
     def __init__(self, views: Sequence[tuple[RenderingMatrix, Sequence[tuple[int, float]]]], maps: Sequence[TexelTopology | CubePyramidLayout], nodes: int = 1, options: SolveOptions = ...) -> None:
         """
-        views: matrices, each with the nodes whose maps it sees and their weights in the blend: [(0, 1.0)] for the only
-        one. maps: those of a node, stacked as the columns are.
+        views: matrices, each with the nodes whose maps it sees and their weights in the blend: [(0,
+        1.0)] for the only one. maps: those of a node, stacked as the columns are.
         """
 
     def solve(self, targets: Sequence[numpy.typing.NDArray[numpy.float32]], row_weights: Sequence[numpy.typing.NDArray[numpy.float32]], prior: numpy.typing.NDArray[numpy.float32] | None = None, initial: numpy.typing.NDArray[numpy.float32] | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], SolveReport]:
         """
         Solves for the maps.
 
-        targets, row_weights: of each view, float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior, initial:
-        float32 (nodes * texels, C). Returns the maps, float32 (nodes * texels, C), within [0, inf) (coverage in [0, 1]),
-        and a report.
+        targets, row_weights: of each view, float32 (rows, C), 1 to 4 channels, the fourth is coverage. prior,
+        initial: float32 (nodes * texels, C). Returns the maps, float32 (nodes * texels, C), within [0, inf)
+        (coverage in [0, 1]), and a report.
         """
 
 class ViewTargets:
     """
-    What maps should make a view look like: sums over traced samples, pixel by pixel, so that a view of many
-    samples never has to be in memory at once.
+    What maps should make a view look like: sums over traced samples, pixel by pixel, so that a view
+    of many samples never has to be in memory at once.
     """
 
     def __init__(self, width: int, height: int, parts: int, shells: int, stacks: Sequence[Sequence[int]] = []) -> None:
         """
-        `stacks`: for each part, front to back, the number of the traced shell that each of its own shells ends
-        with; empty: the traced ones.
+        `stacks`: for each part, front to back, the number of the traced shell that each of its own
+        shells ends with; empty: the traced ones.
         """
 
     def add(self, samples: SurfaceSamples, x: int = 0, y: int = 0) -> None:
         """
-        Adds samples with traced light, at most one trace of every pixel; (x, y): where their image's top left pixel lies
-        in this one.
+        Adds samples with traced light, at most one trace of every pixel; (x, y): where their
+        image's top left pixel lies in this one.
         """
 
     @property
@@ -1811,8 +1835,8 @@ class FitShell:
 
     def __init__(self, proxy: Proxy, map: int, triangles: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None:
         """
-        map: number of its map, which several parts may share. triangles: uint8, 0 for each triangle of the reflector that
-        the shell leaves out, or None if it covers all.
+        map: number of its map, which several parts may share. triangles: uint8, 0 for each triangle
+        of the reflector that the shell leaves out, or None if it covers all.
         """
 
 class DisplayView:
@@ -1820,8 +1844,9 @@ class DisplayView:
 
     def __init__(self, lookups: SurfaceSamples, targets: ViewTargets, nodes: Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0) -> None:
         """
-        lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at RunTimeModel.places). nodes:
-        whose maps are blended for the view, with their weights. weight: of its rows, >= 0.
+        lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at
+        RunTimeModel.places). nodes: whose maps are blended for the view, with their weights. weight: of its
+        rows, >= 0.
         """
 
 class DisplayFitOptions:
@@ -1850,11 +1875,13 @@ class DisplayFitOptions:
 
 def fit_display(views: Sequence[DisplayView], parts: Sequence[Sequence[FitShell]], maps: Sequence[TexelTopology], nodes: int = 1, run_time: RunTimeModel = ..., options: DisplayFitOptions = ..., prior: numpy.typing.NDArray[numpy.float32] | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport]]:
     """
-    Infers the maps of all shells and parts, of one or several nodes, together, from the pixels that the run time will show.
+    Infers the maps of all shells and parts, of one or several nodes, together, from the pixels that
+    the run time will show.
 
-    parts: the shells of each part, front to back, in the order of the traced shells; the last is opaque. prior: float32
-    (nodes * texels, 3) or None. Returns the maps, float32 (nodes * texels, 4), premultiplied radiance and alpha, those of
-    a node stacked in the order of `maps`; and reports of the layers' own fit, then of each pass.
+    parts: the shells of each part, front to back, in the order of the traced shells; the last is opaque.
+    prior: float32 (nodes * texels, 3) or None. Returns the maps, float32 (nodes * texels, 4), premultiplied
+    radiance and alpha, those of a node stacked in the order of `maps`; and reports of the layers' own fit,
+    then of each pass.
     """
 
 class ShellMap:
@@ -1862,8 +1889,8 @@ class ShellMap:
 
     def __init__(self, proxy: Proxy, topology: TexelTopology | CubePyramidLayout, texels: numpy.typing.NDArray[numpy.float32], triangles: numpy.typing.NDArray[numpy.uint8] | None = None) -> None:
         """
-        texels: float32 (texels, 4), premultiplied RGBA, or (texels, 3), opaque. triangles: uint8, 0 for each triangle of
-        the reflector that the shell leaves out, or None if it covers all.
+        texels: float32 (texels, 4), premultiplied RGBA, or (texels, 3), opaque. triangles: uint8, 0
+        for each triangle of the reflector that the shell leaves out, or None if it covers all.
         """
 
     @property
@@ -1884,7 +1911,8 @@ class ShellMap:
 
 def render_reflector(samples: SurfaceSamples, parts: Sequence[Sequence[ShellMap]], diffuse: numpy.typing.NDArray[numpy.float32] | None = None, run_time: RunTimeModel = ...) -> numpy.typing.NDArray[numpy.float32]:
     """
-    Draws the reflector from its maps: (L0 + (1 - a0)(L1 + ...)) F + D per sample, averaged over the pixel.
+    Draws the reflector from its maps: (L0 + (1 - a0)(L1 + ...)) F + D per sample, averaged over the
+    pixel.
 
     parts: the shells of each part, front to back. diffuse: float32 (len(samples), 3) or None for black.
     Returns float32 (H, W, 4): light times coverage, and coverage.
@@ -1892,13 +1920,14 @@ def render_reflector(samples: SurfaceSamples, parts: Sequence[Sequence[ShellMap]
 
 def shell_light(samples: SurfaceSamples, map: ShellMap, run_time: RunTimeModel = ...) -> numpy.typing.NDArray[numpy.float32]:
     """
-    What every sample reads of one shell's map, float32 (len(samples), 4): premultiplied light, not yet times F, and
-    alpha, which is 0 where the shell leaves the sample's triangle out.
+    What every sample reads of one shell's map, float32 (len(samples), 4): premultiplied light, not
+    yet times F, and alpha, which is 0 where the shell leaves the sample's triangle out.
     """
 
 def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], vertex_irradiance: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
     """
-    Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex (V, 3).
+    Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex
+    (V, 3).
     """
 
 class ProbedMatrix:

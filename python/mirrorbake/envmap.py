@@ -114,7 +114,7 @@ class EnvMap:
             It has another shape.
         """
         block = np.ascontiguousarray(real_array("array", array, np.float32))
-        faces = {"cube": 6, "dual_paraboloid": 2}.get(projection.partition(":")[0], 1)
+        faces = _core.face_count(projection)
         expected = 4 if faces > 1 else 3
         if block.ndim != expected or (faces > 1 and block.shape[0] != faces):
             shape = f"({faces}, height, width, channels)" if faces > 1 else "(height, width, channels)"

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/dds.hpp"
 #include "mirrorbake/envmap/ktx2.hpp"
 #include "mirrorbake/envmap/resample.hpp"
+#include "mirrorbake/projection/traits.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -83,12 +85,9 @@ void for_each_texel(const Arrangement& a, const Image& image, const EnvMapLayout
 }
 
 std::string face_path(const std::string& path, const Projection& projection, int face) {
-  static constexpr std::array<const char*, 6> kCube = {"px", "nx", "py", "ny", "pz", "nz"};
-  static constexpr std::array<const char*, 2> kParaboloid = {"front", "back"};
   std::string result = path;
-  const std::size_t index = static_cast<std::size_t>(face);
   return result.replace(result.find("{}"), 2,
-                        projection.kind == ProjectionKind::cube ? kCube[index] : kParaboloid[index]);
+                        traits(projection.kind).face_names[static_cast<std::size_t>(face)]);
 }
 
 bool names_faces(const std::string& path) { return path.find("{}") != std::string::npos; }
@@ -238,7 +237,7 @@ EnvMap load_envmap(const std::string& path, const std::optional<Projection>& pro
   }
 }
 
-Image load_panorama(const std::string& path, const ImageChoice& choice, const ImageLimits& limits) {
+Panorama load_panorama(const std::string& path, const ImageChoice& choice, const ImageLimits& limits) {
   EnvMap map;
   if (stores_levels(path)) {
     map = is_dds(path) ? load_dds(path, limits) : load_ktx2(path, limits);
@@ -260,9 +259,16 @@ Image load_panorama(const std::string& path, const ImageChoice& choice, const Im
     map = resample(finest, Projection{ProjectionKind::latlong}, 4 * map.layout.width, 2 * map.layout.width);
   }
   const auto channels = static_cast<std::size_t>(map.layout.channels);
-  Image panorama(map.layout.width, map.layout.height, {"R", "G", "B"});
-  for (std::size_t i = 0; i < panorama.pixels.size(); ++i) {
-    panorama.pixels[i] = map.values[i / 3 * channels + (channels == 1 ? 0 : i % 3)];
+  Panorama panorama{Image(map.layout.width, map.layout.height, {"R", "G", "B"})};
+  std::size_t not_finite = 0;
+  for (std::size_t i = 0; i < panorama.image.pixels.size(); ++i) {
+    const float value = map.values[i / 3 * channels + (channels == 1 ? 0 : i % 3)];
+    if (!std::isfinite(value)) ++not_finite;
+    if (value < 0.0F) ++panorama.negative;
+    panorama.image.pixels[i] = std::max(value, 0.0F);
+  }
+  if (not_finite > 0) {
+    throw FileError(path, std::to_string(not_finite) + " values are not finite, expected radiance");
   }
   return panorama;
 }

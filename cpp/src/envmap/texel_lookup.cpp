@@ -2,11 +2,14 @@
 
 #include <algorithm>
 
+#include "mirrorbake/projection/traits.hpp"
+
 namespace mirrorbake {
 
 FaceTexel continued(const Projection& projection, int width, int height, FaceTexel texel) {
   if (texel.row >= 0 && texel.row < height && texel.column >= 0 && texel.column < width) return texel;
-  if (projection.kind == ProjectionKind::sphere_map || projection.kind == ProjectionKind::fisheye) {
+  const Rim rim = traits(projection.kind).rim;
+  if (rim == Rim::singular || rim == Rim::boundary) {
     return {texel.face, std::clamp(texel.row, 0, height - 1), std::clamp(texel.column, 0, width - 1)};
   }
   // The direction of the missing texel's centre, seen from the neighbouring face, is shifted along the edge

@@ -103,7 +103,7 @@ MapSolver::MapSolver(std::span<const SolverView> views, std::span<const TexelTop
       for (const std::uint32_t texel : view.texels) unknowns.push_back(number_of[first + texel]);
     }
   }
-  Regulariser regulariser(maps, number_of, numbered.size(), {options.smoothness, options.level_agreement});
+  Regulariser regulariser(maps, number_of, numbered.size(), options);
   state_ = std::make_unique<State>(State{options,
                                          {maps.begin(), maps.end()},
                                          texels,

@@ -3,8 +3,8 @@
 namespace mirrorbake {
 
 Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
-                         std::size_t numbers, Weights weights)
-    : weights_(weights), links_(numbers), diagonal_(numbers) {
+                         std::size_t numbers, const SolveOptions& options)
+    : options_(options), links_(numbers), diagonal_(numbers) {
   for (std::size_t first = 0; first < number_of.size();) {
     for (const TexelTopology& map : maps) {
       const auto number = [&](std::uint32_t texel) {
@@ -36,9 +36,9 @@ Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<
     for (std::size_t i = begin; i < end; ++i) {
       float d = 0.0F;
       for (std::uint32_t neighbour : links_[i].neighbours)
-        d += neighbour != kNoTexel ? weights_.smoothness : 0.0F;
-      d += weights_.level_agreement * 0.25F * child_count(i);
-      if (links_[i].parent != kNoTexel) d += weights_.level_agreement * 0.25F / child_count(links_[i].parent);
+        d += neighbour != kNoTexel ? options_.smoothness : 0.0F;
+      d += options_.level_agreement * 0.25F * child_count(i);
+      if (links_[i].parent != kNoTexel) d += options_.level_agreement * 0.25F / child_count(links_[i].parent);
       diagonal_[i] = d;
     }
   });
@@ -74,8 +74,8 @@ void Regulariser::apply(const std::vector<Channels>& x, float magnitude, std::ve
           count += sibling != kNoTexel ? 1.0F : 0.0F;
         disagreement -= scratch[links.parent] / broadcast(count);
       }
-      y[i] = broadcast(weights_.smoothness) * difference +
-             broadcast(weights_.level_agreement) * disagreement + broadcast(magnitude) * x[i];
+      y[i] = broadcast(options_.smoothness) * difference +
+             broadcast(options_.level_agreement) * disagreement + broadcast(magnitude) * x[i];
     }
   });
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mirrorbake/envmap/texel_topology.hpp"
+#include "mirrorbake/inference/map_solver.hpp"
 #include "texel_vector.hpp"
 
 namespace mirrorbake {
@@ -15,14 +16,10 @@ namespace mirrorbake {
 /// would involve texels without a number are left out.
 class Regulariser {
  public:
-  struct Weights {
-    float smoothness, level_agreement;
-  };
-
   /// `number_of`: the number of every texel of all maps, in their order, that of all nodes one after the
-  /// other; kNoTexel for those without.
+  /// other; kNoTexel for those without. Of the options it takes the weights of its terms.
   Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
-              std::size_t numbers, Weights weights);
+              std::size_t numbers, const SolveOptions& options);
 
   /// y = (G + magnitude · 1) x, where the form is xᵀ G x. `scratch` is memory to work in.
   void apply(const std::vector<Channels>& x, float magnitude, std::vector<Channels>& scratch,
@@ -37,7 +34,7 @@ class Regulariser {
     std::array<std::uint32_t, 4> children;
     std::uint32_t parent;
   };
-  Weights weights_;
+  SolveOptions options_;
   std::vector<Links> links_;
   std::vector<float> diagonal_;
 };

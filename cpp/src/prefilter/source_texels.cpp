@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mirrorbake/projection/traits.hpp"
+
 namespace mirrorbake {
 namespace {
 
@@ -50,21 +52,8 @@ glm::dvec3 SourceTexels::direction(int face, int row, int column) const {
 }
 
 double texel_width(const EnvMapLayout& layout) {
-  const double pi = std::numbers::pi;
-  switch (layout.projection.kind) {
-    case ProjectionKind::equal_area:
-      // The height of the texels at the poles, √(4/height), would be that of two rows alone.
-      return std::max(2.0 * pi / layout.width, 4.0 / layout.height);
-    case ProjectionKind::latlong: return std::max(2.0 * pi / layout.width, pi / layout.height);
-    case ProjectionKind::cube: return 2.0 / layout.width;
-    case ProjectionKind::dual_paraboloid:
-    case ProjectionKind::sphere_map: return 4.0 / std::min(layout.width, layout.height);
-    case ProjectionKind::angular: return 2.0 * pi / std::min(layout.width, layout.height);
-    case ProjectionKind::fisheye:
-      return static_cast<double>(layout.projection.field_of_view) * (pi / 180.0) /
-             std::min(layout.width, layout.height);
-  }
-  return 1.0;
+  const glm::dvec2 largest = traits(layout.projection.kind).largest_texel(layout.projection);
+  return std::max(2.0 * largest.x / layout.width, 2.0 * largest.y / layout.height);
 }
 
 int parts_for_width(const EnvMapLayout& layout, double sigma) {

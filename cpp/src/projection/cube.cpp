@@ -1,10 +1,13 @@
 #include "mirrorbake/projection/cube.hpp"
 
+#include <array>
 #include <cmath>
 
 #include <glm/geometric.hpp>
 
+#include "all_projections.hpp"
 #include "finite_direction.hpp"
+#include "texel_integral.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -101,5 +104,40 @@ double cube_texel_solid_angle(int size, int column, int row) {
   }
   return 0.5 * step * sum;
 }
+
+namespace {
+
+constexpr std::array<std::string_view, 6> kFaceNames = {"px", "nx", "py", "ny", "pz", "nz"};
+
+double solid_angle(const Projection&, int width, int height, int column, int row) {
+  if (width == height) return cube_texel_solid_angle(width, column, row);
+  return integrate_rectangle(texel_rectangle(width, height, column, row),
+                             [](double x, double y) { return std::pow(1.0 + x * x + y * y, -1.5); });
+}
+
+// Behind the face there is none.
+std::optional<glm::dvec2> on_face(const Projection&, int face, glm::dvec3 d) {
+  const glm::dvec3 major = direction_from_cube_point(face, 0.0, 0.0);
+  const double depth = glm::dot(d, major);
+  if (!(depth > 1e-9 * glm::length(d))) return std::nullopt;
+  const glm::dvec3 x_axis = direction_from_cube_point(face, 1.0, 0.0) - major;
+  const glm::dvec3 y_axis = direction_from_cube_point(face, 0.0, 1.0) - major;
+  return glm::dvec2(glm::dot(d, x_axis), glm::dot(d, y_axis)) / depth;
+}
+
+}  // namespace
+
+const ProjectionTraits kCubeTraits{
+    .name = "cube",
+    .density = CenterDensity::cube,
+    .face_names = kFaceNames,
+    .point_from_direction = [](const Projection&, glm::dvec3 d) { return cube_point_from_direction(d); },
+    .direction_from_point = [](const Projection&, int face, double x,
+                               double y) { return glm::normalize(direction_from_cube_point(face, x, y)); },
+    .jacobian = [](const Projection&, int face, double x, double y) { return cube_jacobian(face, x, y); },
+    .texel_solid_angle = solid_angle,
+    .point_on_face = on_face,
+    .largest_texel = [](const Projection&) { return glm::dvec2(1.0); },
+};
 
 }  // namespace mirrorbake

@@ -1,13 +1,16 @@
 #include "mirrorbake/projection/dual_paraboloid.hpp"
 
+#include <array>
 #include <cmath>
 #include <string>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "all_projections.hpp"
 #include "finite_direction.hpp"
 #include "mirrorbake/core/check.hpp"
+#include "texel_integral.hpp"
 
 namespace mirrorbake {
 
@@ -45,5 +48,39 @@ glm::mat4 dual_paraboloid_texture_matrix(const glm::mat3& frame_from_map, int fa
                              glm::vec4(0.5F, 0.5F, 0, 1));
   return to_texture * perspective * subtract * glm::mat4(glm::transpose(frame_from_map));
 }
+
+namespace {
+
+constexpr std::array<std::string_view, 2> kFaceNames = {"front", "back"};
+
+double solid_angle(const Projection&, int width, int height, int column, int row) {
+  return integrate_in_disc(texel_rectangle(width, height, column, row),
+                           [](double r2) { return 4.0 / ((1.0 + r2) * (1.0 + r2)); });
+}
+
+std::optional<glm::dvec2> on_face(const Projection&, int face, glm::dvec3 d) {
+  const double length = glm::length(d);
+  const double q = length + (face == 0 ? d.z : -d.z);
+  if (!(q > 1e-9 * length)) return std::nullopt;
+  return glm::dvec2(d) / q;
+}
+
+}  // namespace
+
+const ProjectionTraits kDualParaboloidTraits{
+    .name = "dual_paraboloid",
+    .shape = FaceShape::disc,
+    .rim = Rim::neighbour,
+    .density = CenterDensity::paraboloid,
+    .face_names = kFaceNames,
+    .point_from_direction = [](const Projection&, glm::dvec3 d) { return dual_paraboloid_from_direction(d); },
+    .direction_from_point = [](const Projection&, int face, double x,
+                               double y) { return direction_from_dual_paraboloid(face, x, y); },
+    .jacobian = [](const Projection&, int face, double x,
+                   double y) { return dual_paraboloid_jacobian(face, x, y); },
+    .texel_solid_angle = solid_angle,
+    .point_on_face = on_face,
+    .largest_texel = [](const Projection&) { return glm::dvec2(2.0); },
+};
 
 }  // namespace mirrorbake

@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "all_projections.hpp"
 #include "finite_direction.hpp"
 #include "mirrorbake/projection/latlong.hpp"
 
@@ -53,5 +54,18 @@ MapJacobian equal_area_jacobian(double x, double y) {
   const double way = std::abs(y - 4.0 * std::round(0.25 * y)) > 1.0 ? -1.0 : 1.0;
   return {kPi * cosine * glm::dvec3(c, 0.0, s), way / cosine * glm::dvec3(-p.sine * s, p.cosine, p.sine * c)};
 }
+
+const ProjectionTraits kEqualAreaTraits{
+    .name = "equal_area",
+    .shape = FaceShape::panorama,
+    .point_from_direction = [](const Projection&, glm::dvec3 d) { return equal_area_from_direction(d); },
+    .direction_from_point = [](const Projection&, int, double x,
+                               double y) { return direction_from_equal_area(x, y); },
+    .jacobian = [](const Projection&, int, double x, double y) { return equal_area_jacobian(x, y); },
+    .texel_solid_angle = [](const Projection&, int width, int height, int,
+                            int) { return 4.0 * kPi / (static_cast<double>(width) * height); },
+    // In height that of two rows from a pole, not √(4/rows) of the texels there.
+    .largest_texel = [](const Projection&) { return glm::dvec2(kPi, 2.0); },
+};
 
 }  // namespace mirrorbake

@@ -1,8 +1,13 @@
 #include "mirrorbake/projection/fisheye.hpp"
 
 #include <cmath>
+#include <numbers>
 
+#include <glm/trigonometric.hpp>
+
+#include "all_projections.hpp"
 #include "finite_direction.hpp"
+#include "texel_integral.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -40,5 +45,52 @@ MapJacobian fisheye_jacobian(double x, double y, double field_of_view) {
       a * r > 1e-3 ? (a * std::cos(a * r) * r - std::sin(a * r)) / (r * r * r) : -a * a * a / 3.0;
   return {{g + h * x * x, h * x * y, a * g * x}, {h * x * y, g + h * y * y, a * g * y}};
 }
+
+namespace {
+
+// An angular map is a fisheye that sees everything.
+double field_of_view(const Projection& p) {
+  return p.kind == ProjectionKind::angular ? 2.0 * std::numbers::pi
+                                           : glm::radians(static_cast<double>(p.field_of_view));
+}
+
+// Not clamped to the rim.
+std::optional<glm::dvec2> on_face(const Projection& p, int, glm::dvec3 d) {
+  const double across = std::hypot(d.x, d.y);
+  const double radius = std::atan2(across, -d.z) / (0.5 * field_of_view(p));
+  return across == 0.0 ? glm::dvec2(radius, 0.0) : radius / across * glm::dvec2(d);
+}
+
+double solid_angle(const Projection& p, int width, int height, int column, int row) {
+  const double half = 0.5 * field_of_view(p);
+  return integrate_in_disc(texel_rectangle(width, height, column, row), [half](double r2) {
+    const double radius = std::sqrt(r2);
+    return half * (radius > 1e-8 ? std::sin(half * radius) / radius : half);
+  });
+}
+
+constexpr ProjectionTraits traits_of(std::string_view name, Rim rim) {
+  return {
+      .name = name,
+      .shape = FaceShape::disc,
+      .rim = rim,
+      .density = CenterDensity::fisheye,
+      .takes_field_of_view = rim == Rim::boundary,
+      .point_from_direction = [](const Projection& p,
+                                 glm::dvec3 d) { return fisheye_from_direction(d, field_of_view(p)); },
+      .direction_from_point = [](const Projection& p, int, double x,
+                                 double y) { return direction_from_fisheye(x, y, field_of_view(p)); },
+      .jacobian = [](const Projection& p, int, double x,
+                     double y) { return fisheye_jacobian(x, y, field_of_view(p)); },
+      .texel_solid_angle = solid_angle,
+      .point_on_face = on_face,
+      .largest_texel = [](const Projection& p) { return glm::dvec2(0.5 * field_of_view(p)); },
+  };
+}
+
+}  // namespace
+
+const ProjectionTraits kAngularTraits = traits_of("angular", Rim::direction);
+const ProjectionTraits kFisheyeTraits = traits_of("fisheye", Rim::boundary);
 
 }  // namespace mirrorbake

@@ -5,7 +5,9 @@
 
 #include <glm/geometric.hpp>
 
+#include "all_projections.hpp"
 #include "finite_direction.hpp"
+#include "texel_integral.hpp"
 
 namespace mirrorbake {
 
@@ -32,5 +34,21 @@ MapJacobian sphere_map_jacobian(double x, double y) {
   const double xy = -2.0 * x * y / z;
   return {{2.0 * z - 2.0 * x * x / z, xy, -4.0 * x}, {xy, 2.0 * z - 2.0 * y * y / z, -4.0 * y}};
 }
+
+const ProjectionTraits kSphereMapTraits{
+    .name = "sphere_map",
+    .shape = FaceShape::disc,
+    .rim = Rim::singular,
+    .density = CenterDensity::equal,
+    .point_from_direction = [](const Projection&, glm::dvec3 d) { return sphere_map_from_direction(d); },
+    .direction_from_point = [](const Projection&, int, double x,
+                               double y) { return direction_from_sphere_map(x, y); },
+    .jacobian = [](const Projection&, int, double x, double y) { return sphere_map_jacobian(x, y); },
+    .texel_solid_angle =
+        [](const Projection&, int width, int height, int column, int row) {
+          return integrate_in_disc(texel_rectangle(width, height, column, row), [](double) { return 4.0; });
+        },
+    .largest_texel = [](const Projection&) { return glm::dvec2(2.0); },
+};
 
 }  // namespace mirrorbake

@@ -12,6 +12,11 @@ struct Rectangle {
   double x0, x1, y0, y1;
 };
 
+inline Rectangle texel_rectangle(int width, int height, int column, int row) {
+  return {2.0 * column / width - 1.0, 2.0 * (column + 1) / width - 1.0, 1.0 - 2.0 * (row + 1) / height,
+          1.0 - 2.0 * row / height};
+}
+
 // Gauss-Legendre nodes and weights on [−1,1] (Abramowitz & Stegun, table 25.4).
 inline constexpr std::array<double, 5> kGaussNodes = {0.0, -0.5384693101056831, 0.5384693101056831,
                                                       -0.9061798459386640, 0.9061798459386640};

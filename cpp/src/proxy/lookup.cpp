@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "lookup_constants.hpp"
 #include "lookup_formulas.hpp"
 #include "lookup_kernels.hpp"
 #include "mirrorbake/core/check.hpp"
@@ -31,60 +32,16 @@ const LookupKernels& lookup_kernels() {
 
 namespace {
 
-void set(double (&to)[3], glm::vec3 from) {
-  for (int i = 0; i < 3; ++i) to[i] = static_cast<double>(from[i]);
-}
-
-void set_frame(LookupConstants& k, glm::vec3 centre, const glm::mat3& proxy_from_world, glm::dvec3 scale) {
-  set(k.centre, centre);
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      k.rows[3 * row + column] = scale[row] * static_cast<double>(proxy_from_world[column][row]);
-    }
-  }
-  k.rotated = proxy_from_world != glm::mat3(1.0F);
-}
-
-void set_shape(LookupConstants&, const InfiniteSphere&) {}
-
-void set_shape(LookupConstants& k, const Box& box) {
-  k.shape = LookupShape::box;
-  set_frame(k, box.centre, box.proxy_from_world, glm::dvec3(1.0));
-  set(k.extent, box.half_extent);
-}
-
-void set_shape(LookupConstants& k, const Ellipsoid& ellipsoid) {
-  k.shape = LookupShape::ellipsoid;
-  set_frame(k, ellipsoid.centre, ellipsoid.proxy_from_world, 1.0 / glm::dvec3(ellipsoid.radii));
-}
-
-void set_shape(LookupConstants& k, const Hemisphere& dome) {
-  k.shape = LookupShape::hemisphere;
-  set_frame(k, dome.centre, dome.proxy_from_world, glm::dvec3(1.0 / static_cast<double>(dome.radius)));
-}
-
-LookupConstants constants(const Proxy& proxy) {
-  LookupConstants k;
-  std::visit([&](const auto& shape) { set_shape(k, shape); }, proxy.shape);
-  set(k.origin, proxy.origin);
-  return k;
-}
-
 template <typename Vector>
 Vector lookup_one(const Proxy& proxy, const Vector& position, const Vector& direction) {
   using baseline::Vec;
-  const LookupConstants k = constants(proxy);
+  const LookupConstants k = lookup_constants(proxy);
   const Vec p = {static_cast<double>(position.x), static_cast<double>(position.y),
                  static_cast<double>(position.z)};
   const Vec d = {static_cast<double>(direction.x), static_cast<double>(direction.y),
                  static_cast<double>(direction.z)};
   Vec h = d;
-  switch (k.shape) {
-    case LookupShape::infinite: break;
-    case LookupShape::box: h = baseline::lookup<LookupShape::box, true>(k, p, d); break;
-    case LookupShape::ellipsoid: h = baseline::lookup<LookupShape::ellipsoid, true>(k, p, d); break;
-    case LookupShape::hemisphere: h = baseline::lookup<LookupShape::hemisphere, true>(k, p, d); break;
-  }
+  baseline::with_shape(k.shape, [&]<LookupShape shape>() { h = baseline::lookup<shape, true>(k, p, d); });
   return Vector(glm::dvec3(h.x, h.y, h.z));
 }
 
@@ -141,7 +98,7 @@ glm::dvec3 lookup_direction(const Proxy& proxy, glm::dvec3 position, glm::dvec3 
 
 void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
                        std::span<const glm::vec3> directions, std::span<glm::vec3> lookups) {
-  const LookupConstants k = constants(proxy);
+  const LookupConstants k = lookup_constants(proxy);
   map_rays(positions, "directions", directions, lookups, 1,
            [&](const float* p, const float* d, float* l, std::size_t count) {
              return lookup_kernels().rays_f32(k, p, d, l, count);
@@ -150,7 +107,7 @@ void lookup_directions(const Proxy& proxy, std::span<const glm::vec3> positions,
 
 void lookup_directions(const Proxy& proxy, std::span<const glm::dvec3> positions,
                        std::span<const glm::dvec3> directions, std::span<glm::dvec3> lookups) {
-  const LookupConstants k = constants(proxy);
+  const LookupConstants k = lookup_constants(proxy);
   map_rays(positions, "directions", directions, lookups, 1,
            [&](const double* p, const double* d, double* l, std::size_t count) {
              return lookup_kernels().rays_f64(k, p, d, l, count);
@@ -162,9 +119,8 @@ void mirror_lookups(std::span<const Proxy> proxies, glm::vec3 eye, std::span<con
   if (proxies.empty()) throw InvalidArgument("proxies", "empty", "at least one");
   check_finite("eye", eye);
   std::vector<LookupConstants> k;
-  for (const Proxy& proxy : proxies) k.push_back(constants(proxy));
-  double e[3];
-  set(e, eye);
+  for (const Proxy& proxy : proxies) k.push_back(lookup_constants(proxy));
+  const double e[3] = {static_cast<double>(eye.x), static_cast<double>(eye.y), static_cast<double>(eye.z)};
   map_rays(positions, "normals", normals, lookups, k.size(),
            [&](const float* p, const float* n, float* l, std::size_t count) {
              return lookup_kernels().mirrors_f32(k.data(), k.size(), e, p, n, l, positions.size(), count);

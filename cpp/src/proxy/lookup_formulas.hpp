@@ -9,6 +9,13 @@
 
 #include "lookup_kernels.hpp"
 
+namespace mirrorbake {
+
+/// In the order of Proxy::shape.
+enum class LookupShape : int { infinite, box, ellipsoid, hemisphere, count };
+
+}  // namespace mirrorbake
+
 namespace mirrorbake::MIRRORBAKE_ISA {
 namespace {
 
@@ -100,6 +107,16 @@ inline Vec lookup(const LookupConstants& k, const Vec& p, const Vec& d) {
     if constexpr (shape == LookupShape::ellipsoid) t = sphere_exit(local_p, local_d);
     if constexpr (shape == LookupShape::hemisphere) t = hemisphere_exit(local_p, local_d);
     return p + t * d - vec(k.origin);
+  }
+}
+
+/// Calls function.operator()<shape>().
+template <int number = 0, typename Function>
+inline void with_shape(LookupShape shape, const Function& function) {
+  if (static_cast<int>(shape) == number) {
+    function.template operator()<static_cast<LookupShape>(number)>();
+  } else if constexpr (number + 1 < static_cast<int>(LookupShape::count)) {
+    with_shape<number + 1>(shape, function);
   }
 }
 

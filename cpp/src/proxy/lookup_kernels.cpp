@@ -71,28 +71,16 @@ void look_up(const LookupConstants& constants, const Block<P>& positions, const 
   }
 }
 
-template <LookupShape shape, typename P, typename D>
-void look_up_shape(const LookupConstants& k, const Block<P>& positions, const Block<D>& directions,
-                   std::size_t count, Block<P>& lookups) {
-  if (k.rotated) {
-    look_up<shape, true>(k, positions, directions, count, lookups);
-  } else {
-    look_up<shape, false>(k, positions, directions, count, lookups);
-  }
-}
-
 template <typename P, typename D>
 void look_up_block(const LookupConstants& k, const Block<P>& positions, const Block<D>& directions,
                    std::size_t count, Block<P>& lookups) {
-  switch (k.shape) {
-    case LookupShape::infinite:
-      return look_up<LookupShape::infinite, false>(k, positions, directions, count, lookups);
-    case LookupShape::box: return look_up_shape<LookupShape::box>(k, positions, directions, count, lookups);
-    case LookupShape::ellipsoid:
-      return look_up_shape<LookupShape::ellipsoid>(k, positions, directions, count, lookups);
-    case LookupShape::hemisphere:
-      return look_up_shape<LookupShape::hemisphere>(k, positions, directions, count, lookups);
-  }
+  with_shape(k.shape, [&]<LookupShape shape>() {
+    if (k.rotated) {
+      look_up<shape, true>(k, positions, directions, count, lookups);
+    } else {
+      look_up<shape, false>(k, positions, directions, count, lookups);
+    }
+  });
 }
 
 /// Calls block(first ray, count, positions, seconds) for block after block.

@@ -6,12 +6,12 @@
 /// AVX may not use inline functions of the standard library or GLM (see mirrorbake_add_isa_sources).
 namespace mirrorbake {
 
-enum class LookupShape { infinite, box, ellipsoid, hemisphere };
+enum class LookupShape : int;  // lookup_formulas.hpp
 
 /// A proxy as the loops want it: local = rows · (p − centre), where the rows of the 3×3 matrix are the
 /// proxy's axes, divided by the radii for curved shapes.
 struct LookupConstants {
-  LookupShape shape = LookupShape::infinite;
+  LookupShape shape{};
   bool rotated = false;
   double centre[3] = {};
   double rows[9] = {};

@@ -4,16 +4,22 @@
 #include <cmath>
 #include <string>
 #include <type_traits>
+#include <variant>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "lookup_constants.hpp"
+#include "lookup_formulas.hpp"
 #include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake {
 namespace {
+
+static_assert(std::variant_size_v<decltype(Proxy::shape)> == static_cast<std::size_t>(LookupShape::count));
 
 void check_extent(const char* name, glm::vec3 v) {
   if (!is_finite(v) || !(v.x > 0 && v.y > 0 && v.z > 0)) {
@@ -59,7 +65,44 @@ void check_shape(const Hemisphere& dome) {
   check_orthonormal("hemisphere proxy_from_world", dome.proxy_from_world);
 }
 
+void set(double (&to)[3], glm::vec3 from) {
+  for (int i = 0; i < 3; ++i) to[i] = static_cast<double>(from[i]);
+}
+
+void set_frame(LookupConstants& k, glm::vec3 centre, const glm::mat3& proxy_from_world, glm::dvec3 scale) {
+  set(k.centre, centre);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      k.rows[3 * row + column] = scale[row] * static_cast<double>(proxy_from_world[column][row]);
+    }
+  }
+  k.rotated = proxy_from_world != glm::mat3(1.0F);
+}
+
+void set_shape(LookupConstants&, const InfiniteSphere&) {}
+
+void set_shape(LookupConstants& k, const Box& box) {
+  set_frame(k, box.centre, box.proxy_from_world, glm::dvec3(1.0));
+  set(k.extent, box.half_extent);
+}
+
+void set_shape(LookupConstants& k, const Ellipsoid& ellipsoid) {
+  set_frame(k, ellipsoid.centre, ellipsoid.proxy_from_world, 1.0 / glm::dvec3(ellipsoid.radii));
+}
+
+void set_shape(LookupConstants& k, const Hemisphere& dome) {
+  set_frame(k, dome.centre, dome.proxy_from_world, glm::dvec3(1.0 / static_cast<double>(dome.radius)));
+}
+
 }  // namespace
+
+LookupConstants lookup_constants(const Proxy& proxy) {
+  LookupConstants k;
+  k.shape = static_cast<LookupShape>(proxy.shape.index());
+  std::visit([&](const auto& shape) { set_shape(k, shape); }, proxy.shape);
+  set(k.origin, proxy.origin);
+  return k;
+}
 
 Proxy translated(const Proxy& proxy, glm::dvec3 by) {
   const auto move = [by](glm::vec3& p) { p = glm::vec3(glm::dvec3(p) + by); };

@@ -6,19 +6,12 @@
 #endif
 
 #include "fresnel_formulas.hpp"
+#include "mirrorbake/core/vector_bytes.hpp"
 
 namespace mirrorbake::MIRRORBAKE_ISA {
 namespace {
 
 // Plain loops that the compiler vectorises; `__restrict` is what lets it, and callers have checked it.
-
-#if defined(__AVX512F__)
-constexpr std::size_t kVectorBytes = 64;
-#elif defined(__AVX2__)
-constexpr std::size_t kVectorBytes = 32;
-#else
-constexpr std::size_t kVectorBytes = 16;
-#endif
 
 /// Whether to go through c and f from their ends. A load waits for an earlier store that has the same last 12
 /// bits of the address (Intel 64 and IA-32 Architectures Optimization Reference Manual, "4-KByte memory

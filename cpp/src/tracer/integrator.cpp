@@ -288,6 +288,19 @@ float guided_partner_weight(const LitWorld& lit, CausticGuide::Cell cell, glm::v
 
 float brightest(glm::vec3 c) { return std::max(c.x, std::max(c.y, c.z)); }
 
+// Russian roulette: whether a path goes on; the throughput of those that do makes up for the others. Paths
+// are short-lived only once little is left: an early end saves less time than its noise costs.
+bool survives(glm::vec3& throughput, int vertex, float random) {
+  constexpr float kLittle = 0.25F;
+  const float left = brightest(throughput);
+  if (!(left > 0.0F)) return false;
+  if (vertex < 2 || left >= kLittle) return true;
+  const float survival = left / kLittle;
+  if (!(random < survival)) return false;
+  throughput /= survival;
+  return true;
+}
+
 }  // namespace
 
 glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const PathLimits& limits,
@@ -358,16 +371,7 @@ glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const
     } else {
       throughput *= surface.albedo / (1.0F - specular_probability);
     }
-    // Russian roulette. Paths are short-lived only once little is left: an early end saves less time than its
-    // noise costs.
-    constexpr float kLittle = 0.25F;
-    const float left = brightest(throughput);
-    if (!(left > 0.0F)) return sum;
-    if (vertex >= 2 && left < kLittle) {
-      const float survival = left / kLittle;
-      if (!(choice.y < survival)) return sum;
-      throughput /= survival;
-    }
+    if (!survives(throughput, vertex, choice.y)) return sum;
     if (follow_specular) {
       direction = next.direction;
       pdf = next.pdf;

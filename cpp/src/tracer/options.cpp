@@ -25,43 +25,6 @@ void check_point(const char* argument, glm::vec3 point) {
   if (!usable(point)) throw InvalidArgument(argument, text_of(point), "finite coordinates up to 1e18");
 }
 
-namespace {
-
-void check_rule(const ShellRule& rule, const std::string& where, int objects) {
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-  };
-  if (rule.name.empty() || !std::all_of(rule.name.begin(), rule.name.end(), is_plain)) {
-    throw InvalidArgument(where + ".name", "'" + rule.name + "'", "letters, digits, _ or -");
-  }
-  for (const int object : rule.objects) {
-    if (object == ShellRule::kItself || (object >= 0 && object < objects)) continue;
-    throw InvalidArgument(where + ".objects", std::to_string(object),
-                          "object numbers below " + std::to_string(objects) + ", or -1 for the reflector");
-  }
-  if (!(rule.nearer_than > 0.0F)) {
-    throw InvalidArgument(where + ".nearer_than", text_of(rule.nearer_than), "more than 0");
-  }
-}
-
-}  // namespace
-
-void check_shells(const std::vector<ShellRule>& shells, std::size_t objects) {
-  check_range("shells", static_cast<int>(shells.size()), 1, static_cast<int>(kMostShells));
-  for (std::size_t k = 0; k < shells.size(); ++k) {
-    const std::string where = "shells[" + std::to_string(k) + "]";
-    check_rule(shells[k], where, static_cast<int>(objects));
-    for (std::size_t other = 0; other < k; ++other) {
-      if (shells[other].name != shells[k].name) continue;
-      throw InvalidArgument(where + ".name", "'" + shells[k].name + "' again", "different names");
-    }
-  }
-  if (!shells.back().objects.empty() || std::isfinite(shells.back().nearer_than)) {
-    throw InvalidArgument("shells", "'" + shells.back().name + "' last, with a rule",
-                          "a last one without a rule, which takes the rest");
-  }
-}
-
 void validate(const TraceOptions& options) {
   check_range("samples_per_pixel", options.samples_per_pixel, 1, 65536);
   check_range("max_specular_depth", options.max_specular_depth, 0, 64);

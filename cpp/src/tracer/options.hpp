@@ -15,8 +15,6 @@ bool usable(glm::vec3 point);
 void check_point(const char* argument, glm::vec3 point);
 
 void validate(const TraceOptions& options);
-/// Throws InvalidArgument unless the rules are usable in a scene of so many objects.
-void check_shells(const std::vector<ShellRule>& shells, std::size_t objects);
 /// The window of an image that the options mean. Throws InvalidArgument if it does not lie in the image.
 PixelWindow window_in(const TraceOptions& options, int width, int height);
 

@@ -35,6 +35,9 @@ struct IncidentShells {
   }
 };
 
+/// Throws InvalidArgument unless the rules are usable in a scene of so many objects.
+void check_shells(const std::vector<ShellRule>& shells, std::size_t objects);
+
 /// The rules of TraceOptions for one reflector.
 class ShellRays {
  public:
@@ -48,9 +51,9 @@ class ShellRays {
 
  private:
   struct Rule {
-    std::vector<bool> objects;  ///< empty: any, and lights
-    float nearer_than = std::numeric_limits<float>::infinity();
-    bool all_that_is_hit() const { return objects.empty() && nearer_than == kUnlimited; }
+    ShellRule rule;
+    std::vector<bool> is_of;  ///< for every object of the scene, if the rule names any
+    bool all_that_is_hit() const { return is_of.empty() && rule.nearer_than == kUnlimited; }
   };
   static constexpr float kUnlimited = std::numeric_limits<float>::infinity();
 

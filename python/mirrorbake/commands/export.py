@@ -19,83 +19,94 @@ if TYPE_CHECKING:
     from mirrorbake.pem.export.web import WebOptions
 
 
+MapsFolder = Annotated[
+    Path | None,
+    typer.Option("--maps", metavar="OUT", help="Folder for environment maps of other programs."),
+]
+MapFormat = Annotated[
+    str, typer.Option("--format", metavar="ktx2|exr", help="Of --maps; ktx2 holds all levels in a file.")
+]
+MapConvention = Annotated[
+    str,
+    typer.Option(
+        "--convention",
+        metavar="NAME",
+        help="Of --maps: threejs, unity, unreal, blender or godot: whose orientation.",
+    ),
+]
+MapPrecision = Annotated[str, typer.Option("--precision", metavar="half|float32", help="Of --maps.")]
+GlbFile = Annotated[
+    Path | None,
+    typer.Option("--glb", metavar="OUT.glb", help="A glTF file with the mesh, its material and the maps."),
+]
+VideoFile = Annotated[
+    Path | None,
+    typer.Option("--video", metavar="OUT.mp4", help="A film along the first axis of the parameter space."),
+]
+StillFiles = Annotated[
+    Path | None,
+    typer.Option("--stills", metavar="OUT{}.png", help="The same as pictures, .png or .exr; {}: number."),
+]
+FrameCount = Annotated[
+    int | None,
+    typer.Option("--frames", metavar="N", help="Of --video and --stills. [default: one per sample]"),
+]
+FrameRate = Annotated[int, typer.Option("--fps", metavar="N", help="Frames per second of --video.")]
+MapSample = Annotated[
+    int | None,
+    typer.Option(
+        "--sample",
+        metavar="I",
+        help="This sample's maps: with --maps alone, with --glb beside the static.",
+    ),
+]
+AllSamples = Annotated[bool, typer.Option("--all", help="The static maps and those of all samples.")]
+WebFolder = Annotated[
+    Path | None,
+    typer.Option("--web", metavar="OUT", help="Folder for a page that any web server can host."),
+]
+SingleFile = Annotated[
+    bool, typer.Option("--single-file", help="Of --web: OUT is one HTML file, which works from disk.")
+]
+ExactImages = Annotated[
+    bool, typer.Option("--exact", help="Of --web: images in WebP without loss, not AVIF.")
+]
+ImageQuality = Annotated[
+    int, typer.Option("--quality", min=1, max=100, metavar="N", help="Of --web: of AVIF, 1 to 100.")
+]
+ExactFallback = Annotated[
+    bool,
+    typer.Option(
+        help="Of --web: exact images as well, for browsers that show AVIF wrongly; not in a single file."
+    ),
+]
+WithReferences = Annotated[
+    bool, typer.Option(help="Of --web: the ray-traced pictures of the samples, to compare with.")
+]
+
+
 @reports_errors
 def export_command(
     directory: Folder,
-    maps: Annotated[
-        Path | None,
-        typer.Option("--maps", metavar="OUT", help="Folder for environment maps of other programs."),
-    ] = None,
-    format: Annotated[
-        str, typer.Option("--format", metavar="ktx2|exr", help="Of --maps; ktx2 holds all levels in a file.")
-    ] = "ktx2",
-    convention: Annotated[
-        str,
-        typer.Option(
-            "--convention",
-            metavar="NAME",
-            help="Of --maps: threejs, unity, unreal, blender or godot: whose orientation.",
-        ),
-    ] = "threejs",
-    precision: Annotated[
-        str, typer.Option("--precision", metavar="half|float32", help="Of --maps.")
-    ] = "half",
-    glb: Annotated[
-        Path | None,
-        typer.Option(
-            "--glb", metavar="OUT.glb", help="A glTF file with the mesh, its material and the maps."
-        ),
-    ] = None,
-    video: Annotated[
-        Path | None,
-        typer.Option(
-            "--video", metavar="OUT.mp4", help="A film along the first axis of the parameter space."
-        ),
-    ] = None,
-    stills: Annotated[
-        Path | None,
-        typer.Option("--stills", metavar="OUT{}.png", help="The same as pictures, .png or .exr; {}: number."),
-    ] = None,
-    frames: Annotated[
-        int | None,
-        typer.Option("--frames", metavar="N", help="Of --video and --stills. [default: one per sample]"),
-    ] = None,
-    fps: Annotated[int, typer.Option("--fps", metavar="N", help="Frames per second of --video.")] = 30,
+    maps: MapsFolder = None,
+    format: MapFormat = "ktx2",
+    convention: MapConvention = "threejs",
+    precision: MapPrecision = "half",
+    glb: GlbFile = None,
+    video: VideoFile = None,
+    stills: StillFiles = None,
+    frames: FrameCount = None,
+    fps: FrameRate = 30,
     exposure: Exposure = 0.0,
     tone: ToneMap = "none",
-    sample: Annotated[
-        int | None,
-        typer.Option(
-            "--sample",
-            metavar="I",
-            help="This sample's maps: with --maps alone, with --glb beside the static.",
-        ),
-    ] = None,
-    all_samples: Annotated[
-        bool, typer.Option("--all", help="The static maps and those of all samples.")
-    ] = False,
-    web: Annotated[
-        Path | None,
-        typer.Option("--web", metavar="OUT", help="Folder for a page that any web server can host."),
-    ] = None,
-    single_file: Annotated[
-        bool, typer.Option("--single-file", help="Of --web: OUT is one HTML file, which works from disk.")
-    ] = False,
-    exact: Annotated[
-        bool, typer.Option("--exact", help="Of --web: images in WebP without loss, not AVIF.")
-    ] = False,
-    quality: Annotated[
-        int, typer.Option("--quality", min=1, max=100, metavar="N", help="Of --web: of AVIF, 1 to 100.")
-    ] = 90,
-    fallback: Annotated[
-        bool,
-        typer.Option(
-            help="Of --web: exact images as well, for browsers that show AVIF wrongly; not in a single file."
-        ),
-    ] = True,
-    references: Annotated[
-        bool, typer.Option(help="Of --web: the ray-traced pictures of the samples, to compare with.")
-    ] = True,
+    sample: MapSample = None,
+    all_samples: AllSamples = False,
+    web: WebFolder = None,
+    single_file: SingleFile = False,
+    exact: ExactImages = False,
+    quality: ImageQuality = 90,
+    fallback: ExactFallback = True,
+    references: WithReferences = True,
     threads: Threads = 0,
 ) -> None:
     """Write a PEM for other programs: its maps, a glTF file, a film, pictures, a page that draws it."""

@@ -146,16 +146,10 @@ def _loaded_scene(config: SceneConfig, path: str) -> tuple[_core.LoadedScene, Or
 
 def _add_panorama(scene: _core.Scene, surroundings: Surroundings, origin: Origin) -> list[str]:
     assert surroundings.panorama is not None
-    panorama = _core.load_panorama(surroundings.panorama, surroundings.layer or "", surroundings.part or "")
-    bad = int(np.count_nonzero(~np.isfinite(panorama)))
-    if bad:
-        raise InputError(f"{surroundings.panorama}: {bad} values are not finite; expected radiance")
-    # Panoramas that were scaled down with a sharpening filter undershoot beside their lights.
-    negative = int(np.count_nonzero(panorama < 0.0))
-    notes = []
-    if negative:
-        notes.append(f"{surroundings.panorama}: {negative} negative values were taken as 0")
-        panorama = np.maximum(panorama, np.float32(0.0))
+    panorama, negative = _core.load_panorama(
+        surroundings.panorama, surroundings.layer or "", surroundings.part or ""
+    )
+    notes = [f"{surroundings.panorama}: {negative} negative values were taken as 0"] if negative else []
     scene.set_environment(panorama, surroundings.scale, surroundings.rotation)
     if surroundings.ground is not None:
         material = _core.Material(name="ground", albedo=surroundings.ground.albedo)

@@ -389,14 +389,14 @@ TEST_F(EnvMapFiles, APanoramaIsRecognisedByItsShapeWhateverCubeItIs) {
         std::pair("cross.exr", FaceLayout::cross), std::pair("vertical.exr", FaceLayout::vertical_cross),
         std::pair("cube.ktx2", FaceLayout::automatic)}) {
     save_envmap(path(name), cube, layout, PixelFormat::float32);
-    const Image panorama = load_panorama(path(name));
+    const Image panorama = load_panorama(path(name)).image;
     ASSERT_EQ(panorama.width, 256) << name;
     for (std::size_t i = 0; i < panorama.pixels.size(); ++i) {
       ASSERT_NEAR(panorama.pixels[i], expected.values[i], 0.01F) << name << ' ' << i;
     }
   }
   save_envmap(path("sky.exr"), expected, FaceLayout::automatic, PixelFormat::float32);
-  EXPECT_EQ(load_panorama(path("sky.exr")).pixels, expected.values);
+  EXPECT_EQ(load_panorama(path("sky.exr")).image.pixels, expected.values);
 }
 
 TEST_F(EnvMapFiles, APictureThatIsNoPanoramaIsNoLight) {
@@ -414,15 +414,27 @@ TEST_F(EnvMapFiles, APictureThatIsNoPanoramaIsNoLight) {
   }
 }
 
+TEST_F(EnvMapFiles, APanoramaIsFiniteAndNowhereBelow0) {
+  Image image(2, 1, {"R", "G", "B"});
+  image.pixels = {1, -2, 3, -0.5F, 5, 6};
+  save_image(path("undershoots.exr"), image);
+  const Panorama panorama = load_panorama(path("undershoots.exr"));
+  EXPECT_EQ(panorama.image.pixels, (std::vector<float>{1, 0, 3, 0, 5, 6}));
+  EXPECT_EQ(panorama.negative, 2U);
+  image.pixels[4] = std::numeric_limits<float>::infinity();
+  save_image(path("glows.exr"), image);
+  EXPECT_THROW(load_panorama(path("glows.exr")), FileError);
+}
+
 TEST_F(EnvMapFiles, DepthAndAlphaAreNoLightAndGreyIsAllColours) {
   Image image(2, 1, {"R", "G", "B", "A", "Z"});
   image.pixels = {1, 2, 3, 0, 9, 4, 5, 6, 0, 9};
   save_image(path("deep.exr"), image);
-  EXPECT_EQ(load_panorama(path("deep.exr")).pixels, (std::vector<float>{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(load_panorama(path("deep.exr")).image.pixels, (std::vector<float>{1, 2, 3, 4, 5, 6}));
   Image grey(2, 1, {"Y"});
   grey.pixels = {1, 2};
   save_image(path("grey.exr"), grey);
-  EXPECT_EQ(load_panorama(path("grey.exr")).pixels, (std::vector<float>{1, 1, 1, 2, 2, 2}));
+  EXPECT_EQ(load_panorama(path("grey.exr")).image.pixels, (std::vector<float>{1, 1, 1, 2, 2, 2}));
   Image depth(2, 1, {"Z"});
   save_image(path("z.exr"), depth);
   EXPECT_THROW(load_panorama(path("z.exr")), FileError);

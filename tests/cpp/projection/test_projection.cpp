@@ -327,6 +327,18 @@ TEST(Projection, FisheyeSaysWhatItDoesNotCover) {
   EXPECT_EQ(behind.x, 1.0);
 }
 
+TEST(Projection, TheListIsInTheOrderOfTheKinds) {
+  EXPECT_EQ(parse_projection("cube").kind, ProjectionKind::cube);
+  EXPECT_EQ(parse_projection("dual_paraboloid").kind, ProjectionKind::dual_paraboloid);
+  EXPECT_EQ(parse_projection("sphere_map").kind, ProjectionKind::sphere_map);
+  EXPECT_EQ(parse_projection("latlong").kind, ProjectionKind::latlong);
+  EXPECT_EQ(parse_projection("angular").kind, ProjectionKind::angular);
+  EXPECT_EQ(parse_projection("fisheye").kind, ProjectionKind::fisheye);
+  EXPECT_EQ(parse_projection("equal_area").kind, ProjectionKind::equal_area);
+  EXPECT_EQ(projection_names(),
+            "cube, dual_paraboloid, sphere_map, latlong, angular, fisheye, fisheye:DEGREES, equal_area");
+}
+
 TEST(Projection, NamesRoundTripAndBadOnesAreNamed) {
   for (const char* name :
        {"cube", "dual_paraboloid", "sphere_map", "latlong", "angular", "fisheye:97.5", "equal_area"}) {

@@ -402,7 +402,19 @@ struct Defect {
   std::function<void(Document&)> make;
 };
 
-TEST_F(GltfSceneFile, DefectsAreNamed) {
+class GltfDefects : public GltfSceneFile {
+ protected:
+  void expect_named(const std::vector<Defect>& defects) {
+    for (const Defect& defect : defects) {
+      Document document;
+      document.materials = "[{}]";
+      defect.make(document);
+      expect_error(document, defect.message);
+    }
+  }
+};
+
+TEST_F(GltfDefects, OfMaterialsAndTexturesAreNamed) {
   const auto material = [](const std::string& text) {
     return [text](Document& d) { d.materials = "[" + text + "]"; };
   };
@@ -410,22 +422,6 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
     return [extra](Document& d) {
       d.materials = R"([{"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0}}])";
       d.extra = extra;
-    };
-  };
-  const auto light = [](const std::string& node, const std::string& text) {
-    return [=](Document& d) {
-      d.materials = "[{}]";
-      d.nodes = R"([{"mesh":0},{)" + node + R"("extensions":{"KHR_lights_punctual":{"light":0}}}])";
-      d.roots = "[0,1]";
-      d.extra = R"("extensions":{"KHR_lights_punctual":{"lights":[)" + text + "]}},";
-    };
-  };
-  const auto camera = [](const std::string& node, const std::string& yfov) {
-    return [=](Document& d) {
-      d.materials = "[{}]";
-      d.nodes = R"([{"mesh":0},{"camera":0)" + node + "}]";
-      d.roots = "[0,1]";
-      d.extra = R"("cameras":[{"type":"perspective","perspective":{"yfov":)" + yfov + R"(,"znear":1}}],)";
     };
   };
   write("text.png", "no image");
@@ -472,6 +468,26 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
       {"texCoord is negative",
        material(R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":-3}}}],
           "textures":[{"source":0}],"images":[{"uri":"text.png"}],"x":[0)")},
+  };
+  expect_named(defects);
+}
+
+TEST_F(GltfDefects, OfLightsCamerasAndNodesAreNamed) {
+  const auto light = [](const std::string& node, const std::string& text) {
+    return [=](Document& d) {
+      d.nodes = R"([{"mesh":0},{)" + node + R"("extensions":{"KHR_lights_punctual":{"light":0}}}])";
+      d.roots = "[0,1]";
+      d.extra = R"("extensions":{"KHR_lights_punctual":{"lights":[)" + text + "]}},";
+    };
+  };
+  const auto camera = [](const std::string& node, const std::string& yfov) {
+    return [=](Document& d) {
+      d.nodes = R"([{"mesh":0},{"camera":0)" + node + "}]";
+      d.roots = "[0,1]";
+      d.extra = R"("cameras":[{"type":"perspective","perspective":{"yfov":)" + yfov + R"(,"znear":1}}],)";
+    };
+  };
+  const std::vector<Defect> defects = {
       {"light index is -1", light("", "")},
       {"type is 'laser'", light("", R"({"type":"laser"})")},
       {"intensity is (-", light("", R"({"type":"point","intensity":-1})")},
@@ -485,18 +501,9 @@ TEST_F(GltfSceneFile, DefectsAreNamed) {
       {"yfov is 3.2", camera("", "3.2")},
       {"has no direction", camera(R"(,"scale":[1,1,0])", "1")},
       {"flat camera", camera(R"(,"matrix":[1,0,0,0, 0,0,1,0, 0,0,1,0, 0,0,0,1])", "1")},
-      {"reached twice",
-       [](Document& d) {
-         d.materials = "[{}]";
-         d.nodes = R"([{"mesh":0,"children":[1]},{"children":[0]}])";
-       }},
+      {"reached twice", [](Document& d) { d.nodes = R"([{"mesh":0,"children":[1]},{"children":[0]}])"; }},
   };
-  for (const Defect& defect : defects) {
-    Document document;
-    document.materials = "[{}]";
-    defect.make(document);
-    expect_error(document, defect.message);
-  }
+  expect_named(defects);
 }
 
 TEST_F(GltfSceneFile, ImagesThatClaimMoreThanTheirBytesAreRefusedBeforeAnyIsAllocated) {

@@ -63,7 +63,22 @@ TEST(Scene, ValidationAcceptsACompleteSceneAndAnEmptyOne) {
   EXPECT_NO_THROW(validate(grey));
 }
 
-TEST(Scene, ValidationNamesTheThingAndTheFieldThatIsWrong) {
+// Of a complete scene: each defect is an error that names the thing and its field.
+void expect_refused(const std::vector<Defect>& defects) {
+  for (const Defect& defect : defects) {
+    Scene scene = complete_scene();
+    defect.make(scene);
+    try {
+      validate(scene);
+      ADD_FAILURE() << "accepted: " << defect.expected;
+    } catch (const InvalidArgument& error) {
+      EXPECT_THAT(error.what(), HasSubstr(defect.expected));
+      EXPECT_THAT(error.what(), HasSubstr("expected"));
+    }
+  }
+}
+
+TEST(Scene, ValidationNamesTheFieldOfAMaterialOrTextureThatIsWrong) {
   const std::vector<Defect> defects = {
       {"texture 0 channel count is 2",
        [](Scene& s) {
@@ -112,6 +127,12 @@ TEST(Scene, ValidationNamesTheThingAndTheFieldThatIsWrong) {
          s.materials[0].fresnel.model = FresnelModel::schlick;
          s.materials[0].fresnel.r0.x = 1.1F;
        }},
+  };
+  expect_refused(defects);
+}
+
+TEST(Scene, ValidationNamesTheFieldOfAnObjectOrLightThatIsWrong) {
+  const std::vector<Defect> defects = {
       {"object 0 'sail' material is 1", [](Scene& s) { s.objects[0].material = 1; }},
       {"object 0 'sail' material is -1", [](Scene& s) { s.objects[0].material = -1; }},
       {"object 0 'sail' vertex 2 is", [](Scene& s) { s.objects[0].mesh.positions[2].y = kNan; }},
@@ -155,17 +176,7 @@ TEST(Scene, ValidationNamesTheThingAndTheFieldThatIsWrong) {
       {"environment scale is", [](Scene& s) { s.environment->scale = -1.0F; }},
       {"environment rotation_degrees is", [](Scene& s) { s.environment->rotation_degrees = kNan; }},
   };
-  for (const Defect& defect : defects) {
-    Scene scene = complete_scene();
-    defect.make(scene);
-    try {
-      validate(scene);
-      ADD_FAILURE() << "accepted: " << defect.expected;
-    } catch (const InvalidArgument& error) {
-      EXPECT_THAT(error.what(), HasSubstr(defect.expected));
-      EXPECT_THAT(error.what(), HasSubstr("expected"));
-    }
-  }
+  expect_refused(defects);
 }
 
 TEST(Scene, ValidationIgnoresTheFresnelParametersOfAMatteMaterial) {

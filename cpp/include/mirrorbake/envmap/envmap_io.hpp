@@ -40,12 +40,20 @@ EnvMap unpack_faces(const Image& image, const std::optional<Projection>& project
 EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection = std::nullopt,
                    FaceLayout layout = FaceLayout::automatic, const ImageLimits& limits = {});
 
+/// A panorama as it lights a scene: finite, nowhere below 0.
+struct Panorama {
+  Image image;
+  std::size_t negative = 0;  ///< values that were below 0 in the file and are 0 here
+};
+
 /// Reads a map as light: a latlong of R, G and B, grey repeated, without alpha, depth and other channels. A
 /// picture of 2:1 is one; cubes are recognised, and resampled, as KTX2 files, by 6:1 or 1:6, and as crosses
 /// whose corners are all alike. Throws FileError for any other picture, which is no panorama unless somebody
-/// says so, for no or several layers of colours among which `choice` has not chosen, and for what load_image
-/// refuses.
-Image load_panorama(const std::string& path, const ImageChoice& choice = {}, const ImageLimits& limits = {});
+/// says so, for no or several layers of colours among which `choice` has not chosen, for values that are not
+/// finite, and for what load_image refuses. Panoramas that were scaled down with a sharpening filter
+/// undershoot beside their lights: that is taken as 0.
+Panorama load_panorama(const std::string& path, const ImageChoice& choice = {},
+                       const ImageLimits& limits = {});
 
 /// What save_envmap would refuse whatever the map's values are, before they are computed. Throws FileError
 /// for a path that cannot be written or stored in `format`; InvalidArgument for a layout or `{}` that does

@@ -17,6 +17,7 @@
 /// write float32.
 namespace mirrorbake {
 
+/// In the order of the list in cpp/src/projection/all_projections.hpp.
 enum class ProjectionKind { cube, dual_paraboloid, sphere_map, latlong, angular, fisheye, equal_area };
 
 struct Projection {
@@ -26,10 +27,12 @@ struct Projection {
   bool operator==(const Projection&) const = default;
 };
 
-/// "cube", "dual_paraboloid", "sphere_map", "latlong", "angular", "fisheye",
-/// "fisheye:DEGREES" or "equal_area". Throws InvalidArgument.
+/// The name of a projection, "fisheye:DEGREES" for a field of view of its own. Throws InvalidArgument.
 Projection parse_projection(std::string_view text);
 std::string to_string(const Projection& projection);
+
+/// All names, separated by commas, for help and for errors.
+std::string projection_names();
 
 /// Throws InvalidArgument for a field of view outside (0, 360] degrees.
 void validate(const Projection& projection);
@@ -38,9 +41,7 @@ int face_count(const Projection& projection);
 
 /// Whether columns are longitudes, as of latlong and equal_area: the left side goes on at the right one, and
 /// the texels of a row are alike.
-constexpr bool is_panorama(ProjectionKind kind) {
-  return kind == ProjectionKind::latlong || kind == ProjectionKind::equal_area;
-}
+bool is_panorama(ProjectionKind kind);
 
 /// Width over height that makes texels roughly square: 2 for panoramas, 1 otherwise.
 int natural_aspect(const Projection& projection);

@@ -1,6 +1,8 @@
 // Compiled once per instruction set (mirrorbake_add_isa_sources): MIRRORBAKE_ISA names the level.
 #include "block_weights.hpp"
 
+#include "mirrorbake/core/vector_bytes.hpp"
+
 // How vectors are passed differs between instruction sets, but none is passed beyond this file.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
@@ -13,16 +15,8 @@
 namespace mirrorbake::MIRRORBAKE_ISA {
 namespace {
 
-#if defined(__AVX512F__)
-constexpr std::size_t kBytes = 64;
-#elif defined(__AVX__)
-constexpr std::size_t kBytes = 32;
-#else
-constexpr std::size_t kBytes = 16;
-#endif
-
 // Boxes are small, so that floats hold positions in them to 1e-6 of a texel.
-typedef float Floats __attribute__((vector_size(kBytes)));
+typedef float Floats __attribute__((vector_size(kVectorBytes)));
 constexpr std::size_t kLanes = sizeof(Floats) / sizeof(float);
 
 inline Floats all(float v) { return Floats{} + v; }
@@ -290,7 +284,7 @@ class Batch {
     }
   }
 
-  typedef std::int32_t Indices __attribute__((vector_size(kBytes)));
+  typedef std::int32_t Indices __attribute__((vector_size(kVectorBytes)));
 
   const TexelWeights& source_;
   Points corners_[4];  // from the corner of the box above left

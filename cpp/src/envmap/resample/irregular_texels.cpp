@@ -11,6 +11,7 @@
 #include <glm/trigonometric.hpp>
 
 #include "mirrorbake/envmap/texel_lookup.hpp"
+#include "mirrorbake/projection/traits.hpp"
 
 namespace mirrorbake {
 
@@ -76,7 +77,7 @@ std::optional<std::span<const Tap>> IrregularTexels::find(int face, glm::dvec2 l
   double share = 0.0;
   if (job_.filter == ResampleFilter::automatic) {
     share = interpolated_share(texels_across(face, low, high));
-    if (share > 0.0 && job_.projection().kind == ProjectionKind::sphere_map) {
+    if (share > 0.0 && traits(job_.projection().kind).rim == Rim::singular) {
       share *= interpolable(job_.source, corner(face, middle.x, middle.y).position);
     }
   }
@@ -212,7 +213,7 @@ void IrregularTexels::gather(int face, glm::dvec2 low, glm::dvec2 high, const Co
     if (std::find(faces.begin(), end, corner.face) == end) faces[count++] = corner.face;
   }
   // A texel across the rim of paraboloids lies on both, which go on beyond it: every part of it counts once.
-  const bool crosses_paraboloids = count > 1 && job_.projection().kind == ProjectionKind::dual_paraboloid;
+  const bool crosses_paraboloids = count > 1 && traits(job_.projection().kind).rim == Rim::neighbour;
   if (crosses_paraboloids && depth >= kDeepestOnRim) {
     const glm::dvec2 middle = 0.5 * (low + high);
     faces[0] = corner(face, middle.x, middle.y).face;

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include <glm/trigonometric.hpp>
+#include "mirrorbake/projection/traits.hpp"
 
 namespace mirrorbake {
 
@@ -82,14 +82,12 @@ void LineLookup::set_directions(int face, double y, std::size_t first, std::size
     }
     case ProjectionKind::angular:
     case ProjectionKind::fisheye: {
-      const double half_angle = target.kind == ProjectionKind::angular
-                                    ? std::numbers::pi
-                                    : 0.5 * glm::radians(static_cast<double>(target.field_of_view));
+      const double half_angle = traits(target.kind).largest_texel(target).x;
       resample_kernels().fisheye_directions(tables_.x.data() + first, y, half_angle, count, dx_.data(),
                                             dy_.data(), dz_.data());
       return turn(count);
     }
-    case ProjectionKind::sphere_map:
+    default:
       for (std::size_t i = 0; i < count; ++i) {
         const glm::dvec3 d = at(tables_.x[first + i]);
         dx_[i] = d.x;

@@ -1,11 +1,11 @@
 #include "resample_job.hpp"
 
 #include <cmath>
-#include <numbers>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/trigonometric.hpp>
+
+#include "mirrorbake/projection/traits.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -18,26 +18,19 @@ TexelDensity density_of(const EnvMapLayout& layout) {
   density.height = layout.height;
   const double area = 4.0 / (static_cast<double>(layout.width) * layout.height);
   density.scale = area;
-  switch (layout.projection.kind) {
-    case ProjectionKind::cube: density.kind = TexelDensity::cube; break;
-    case ProjectionKind::dual_paraboloid:
-      density.kind = TexelDensity::paraboloid;
-      density.scale = 4.0 * area;
-      break;
-    case ProjectionKind::angular:
+  const ProjectionTraits& known = traits(layout.projection.kind);
+  const glm::dvec2 largest = known.largest_texel(layout.projection);
+  switch (known.density) {
+    case CenterDensity::tabulated: return density;  // all weights come from a table
+    case CenterDensity::equal: break;
+    case CenterDensity::cube: density.kind = TexelDensity::cube; break;
+    case CenterDensity::paraboloid: density.kind = TexelDensity::paraboloid; break;
+    case CenterDensity::fisheye:
       density.kind = TexelDensity::fisheye;
-      density.half_angle = std::numbers::pi;
-      density.scale = density.half_angle * density.half_angle * area;
+      density.half_angle = largest.x;
       break;
-    case ProjectionKind::fisheye:
-      density.kind = TexelDensity::fisheye;
-      density.half_angle = 0.5 * glm::radians(static_cast<double>(layout.projection.field_of_view));
-      density.scale = density.half_angle * density.half_angle * area;
-      break;
-    case ProjectionKind::sphere_map: density.scale = 4.0 * area; break;
-    case ProjectionKind::latlong:
-    case ProjectionKind::equal_area: break;  // by row
   }
+  density.scale = largest.x * largest.y * area;
   return density;
 }
 
@@ -56,7 +49,8 @@ ResampleJob::ResampleJob(const EnvMapLayout& source_, const EnvMapLayout& target
     for (int row = 0; row < height(); ++row) {
       weights.push_back(texel_solid_angle(projection(), width(), height(), 0, row));
     }
-  } else if (projection().kind == ProjectionKind::cube && width() <= kFewTexels) {
+  } else if (const CenterDensity known = traits(projection().kind).density;
+             known == CenterDensity::tabulated || (known == CenterDensity::cube && width() <= kFewTexels)) {
     weights = texel_solid_angles(projection(), width(), height());
     density.kind = TexelDensity::equal;
   }
@@ -84,7 +78,7 @@ double ResampleJob::weight(int row, int column) const {
 }
 
 DiscExtent disc_extent(ProjectionKind kind, glm::dvec2 low, glm::dvec2 high) {
-  if (kind == ProjectionKind::cube || is_panorama(kind)) return DiscExtent::inside;
+  if (traits(kind).shape != FaceShape::disc) return DiscExtent::inside;
   const glm::dvec2 a = glm::min(low, high);
   const glm::dvec2 b = glm::max(low, high);
   const glm::dvec2 nearest = glm::clamp(glm::dvec2(0.0), a, b);

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numbers>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/trigonometric.hpp>
+
+#include "mirrorbake/projection/traits.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -18,18 +18,7 @@ constexpr double kLongest = 256.0;
 
 // In texels of the source: of 0.1 rad where texels are largest.
 double longest_part(const EnvMapLayout& source) {
-  double width = 0.5 * source.width;
-  switch (source.projection.kind) {
-    case ProjectionKind::cube: break;
-    case ProjectionKind::dual_paraboloid:
-    case ProjectionKind::sphere_map: width *= 0.5; break;
-    case ProjectionKind::latlong:
-    case ProjectionKind::equal_area:
-    case ProjectionKind::angular: width /= std::numbers::pi; break;
-    case ProjectionKind::fisheye:
-      width /= 0.5 * glm::radians(static_cast<double>(source.projection.field_of_view));
-      break;
-  }
+  const double width = 0.5 * source.width / traits(source.projection.kind).largest_texel(source.projection).x;
   return std::min(0.1 * width, kLongest);
 }
 
@@ -43,28 +32,19 @@ double length_of(const Quad& quad) {
 
 StraightLimits straight_limits(const EnvMapLayout& source, const EnvMapLayout& target) {
   // Edges of texels of some 0.035 rad bend by half a hundredth of their length, but more near a singular rim.
-  const auto few_texels = [](ProjectionKind kind) -> std::size_t {
-    if (kind == ProjectionKind::sphere_map) return 60'000;
-    return kind == ProjectionKind::angular ? 15'000 : 10'000;
-  };
-  const bool few = target.level_texels(0) < few_texels(target.projection.kind);
-  const double length = few ? 0.0 : std::min(0.25 * (source.width + 4), kLongest);
+  const ProjectionTraits& from = traits(source.projection.kind);
+  const Rim rim = traits(target.projection.kind).rim;
+  const std::size_t few_texels = rim == Rim::singular ? 60'000 : rim == Rim::direction ? 15'000 : 10'000;
+  const double length =
+      target.level_texels(0) < few_texels ? 0.0 : std::min(0.25 * (source.width + 4), kLongest);
   constexpr double kAny = std::numeric_limits<double>::max();
-  switch (source.projection.kind) {
-    // Around the poles of a panorama images are long and bent along their length. Straight edges n texels of
-    // the target away from one shift 1/(12 n) of the area, which is lost or counted twice beside a texel that
-    // is traced. Towards the rim of a sphere map all images are so.
-    case ProjectionKind::latlong:
-    case ProjectionKind::equal_area:
-      return {target.projection.kind == ProjectionKind::sphere_map ? 0.03 : 0.1, kAny, length};
-    case ProjectionKind::cube:
-    case ProjectionKind::dual_paraboloid: return {0.01, kAny, length};
-    // Along a rim that is a single direction they are slivers, which a small bend empties.
-    case ProjectionKind::sphere_map:
-    case ProjectionKind::angular:
-    case ProjectionKind::fisheye: break;
-  }
-  return {0.01, 0.2, length};
+  // Around the poles of a panorama images are long and bent along their length. Straight edges n texels of
+  // the target away from one shift 1/(12 n) of the area, which is lost or counted twice beside a texel that
+  // is traced. Towards the rim of a sphere map all images are so.
+  if (from.shape == FaceShape::panorama) return {rim == Rim::singular ? 0.03 : 0.1, kAny, length};
+  // Along a rim that is a single direction, or the last one, images are slivers, which a small bend empties.
+  const bool slivers = from.rim != Rim::none && from.rim != Rim::neighbour;
+  return {0.01, slivers ? 0.2 : kAny, length};
 }
 
 StraightLimits limits_of_parts(const EnvMapLayout& source, const StraightLimits& limits) {

@@ -7,6 +7,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "mirrorbake/projection/traits.hpp"
+
 namespace mirrorbake {
 namespace {
 
@@ -50,7 +52,8 @@ bool looks_at_centers(ResampleFilter filter) {
 
 // Whether there are texels beyond a rim that may be interpolated.
 bool goes_on_beyond_rim(ProjectionKind kind) {
-  return kind == ProjectionKind::angular || kind == ProjectionKind::fisheye;
+  const Rim rim = traits(kind).rim;
+  return rim == Rim::direction || rim == Rim::boundary;
 }
 
 // Maps have at most 65536 rows and columns.
@@ -224,7 +227,7 @@ void TapBuilder::classify() {
         kinds_[corner(row, column)] = kIrregular;
       }
     }
-    if (job_.projection().kind == ProjectionKind::sphere_map) fade_interpolation(row);
+    if (traits(job_.projection().kind).rim == Rim::singular) fade_interpolation(row);
     kernels_.find_boxes(above, below, kinds_.data() + first, columns, face, boxes_from(first));
     if (!may_be_beyond) continue;
     find_centers(row);

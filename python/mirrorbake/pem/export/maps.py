@@ -100,30 +100,9 @@ def export_maps(
     }
     clamped = 0
     for maps in sets:
-        parts = []
-        stems: set[str] = set()
-        written: dict[int, dict[str, Any]] = {}
-        for part, shells in maps.parts.items():
-            entries = []
-            for shell in shells:
-                if id(shell) not in written:
-                    everywhere = all(any(s is shell for s in others) for others in maps.parts.values())
-                    stem = (
-                        maps.name
-                        if shell.name == maps.name and everywhere
-                        else f"{maps.name}.{_safe(part)}.{_safe(shell.name)}"
-                    )
-                    if stem in stems:
-                        stem = f"{stem}.{len(stems)}"
-                    stems.add(stem)
-                    files, count = _write_shell(shell, folder, stem, frame, format, precision)
-                    clamped += count
-                    written[id(shell)] = _describe(shell, frame, files, format)
-                entries.append(written[id(shell)])
-            parts.append({"name": part, "shells": entries})
-        description["sets"].append(
-            {"name": maps.name, "point": None if maps.point is None else list(maps.point), "parts": parts}
-        )
+        entry, count = _write_set(maps, folder, frame, format, precision)
+        description["sets"].append(entry)
+        clamped += count
     write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=1) + "\n")
     if clamped and report is not None:
         report(
@@ -135,6 +114,33 @@ def export_maps(
 def _safe(name: str) -> str:
     """A name as a part of a file's name: names of objects may hold anything."""
     return re.sub(r"[^\w-]+", "_", name, flags=re.ASCII)[:60]
+
+
+def _write_set(
+    maps: MapSet, folder: Path, frame: Frame, format: str, precision: str
+) -> tuple[dict[str, Any], int]:
+    """Description of a set whose maps are written, and how many values were clamped."""
+    clamped = 0
+    parts = []
+    stems: set[str] = set()
+    written: dict[int, dict[str, Any]] = {}
+    for part, shells in maps.parts.items():
+        entries = []
+        for shell in shells:
+            if id(shell) not in written:
+                everywhere = all(any(s is shell for s in others) for others in maps.parts.values())
+                alone = shell.name == maps.name and everywhere
+                stem = maps.name if alone else f"{maps.name}.{_safe(part)}.{_safe(shell.name)}"
+                if stem in stems:
+                    stem = f"{stem}.{len(stems)}"
+                stems.add(stem)
+                files, count = _write_shell(shell, folder, stem, frame, format, precision)
+                clamped += count
+                written[id(shell)] = _describe(shell, frame, files, format)
+            entries.append(written[id(shell)])
+        parts.append({"name": part, "shells": entries})
+    point = None if maps.point is None else list(maps.point)
+    return {"name": maps.name, "point": point, "parts": parts}, clamped
 
 
 def _frame(convention: str, format: str, precision: str) -> Frame:

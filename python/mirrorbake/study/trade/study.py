@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, cast
 from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
 from mirrorbake.errors import InputError, OptionError
-from mirrorbake.files import write_text
 from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of, log_ratio
+from mirrorbake.study.trade.notebook import Measurements, Notebook, words_of
 from mirrorbake.study.trade.trial import Bench, Trial, overridden
 
 if TYPE_CHECKING:
@@ -122,62 +122,37 @@ def study(
             raise OptionError(f"--axes {name}: expected some of {', '.join(AXIS_NAMES)}")
     report(0, 1, "preparing the scene")
     folder.mkdir(parents=True, exist_ok=True)
-    notebook = _Notebook(folder / STUDY_NAME, _identity(config))
+    notebook = Notebook(folder / STUDY_NAME, _identity(config))
     stage = _studied(config)
     chosen = [axis for axis in axes_of(stage) if not axes or axis.name in axes]
     if axes and len(chosen) < len(set(axes)):
         missing = sorted(set(axes) - {axis.name for axis in chosen})
         raise OptionError(f"--axes {missing[0]}: this scene has no such choice")
-    bench = Bench(stage.config, folder, stage)
     singles = [{axis.name: setting} for axis in chosen for setting in axis.settings[1:]]
     planned = 1 + len(singles)
-    done: list[Trial] = []
-    costs: list[float] = []
+    trials: list[Trial] = []
 
-    def measure(settings: Mapping[str, Setting]) -> Trial | None:
-        """The trial of some settings; None where time is up or the scene refuses."""
-        kept = notebook.find(settings)
-        if kept is not None or notebook.refusal(settings) is not None:
-            return kept
-        expected = max(costs[-5:], default=0.0)
-        if minutes is not None and done and time.monotonic() - began + expected > 60.0 * minutes:
-            return None
-        start = time.monotonic()
-        try:
-            trial = bench.measure(settings)
-        except (InputError, _core.InvalidArgument, _core.NumericalError) as failure:
-            notebook.refuse(settings, str(failure))
-            return None
-        costs.append(time.monotonic() - start)
-        notebook.keep(trial)
-        return trial
+    def try_all(several: Sequence[Mapping[str, Setting]], first: int) -> None:
+        for step, settings in enumerate(several, start=first):
+            report(step, planned, words_of(settings))
+            trial = measure.trial(settings)
+            if trial is not None:
+                trials.append(trial)
 
-    with bench:
+    with Bench(stage.config, folder, stage) as bench:
+        measure = Measurements(bench, notebook, began, minutes)
         report(0, planned, "the scene's own choice")
-        base = measure({})
+        base = measure.trial({})
         if base is None or base.near is None:
             raise InputError("study: no pixel of the views in the middle of the arc is wholly the object's")
-        done.append(base)
-        for step, settings in enumerate(singles, start=1):
-            report(step, planned, _words(settings))
-            trial = measure(settings)
-            if trial is not None:
-                done.append(trial)
-        promising = _promising(base, chosen, done[1:], combinations)
+        try_all(singles, 1)
+        promising = _promising(base, chosen, trials, combinations)
         planned += len(promising)
-        for step, settings in enumerate(promising, start=1 + len(singles)):
-            report(step, planned, _words(settings))
-            trial = measure(settings)
-            if trial is not None:
-                done.append(trial)
-    report(planned, planned, f"{len(done)} trials")
-    result = Study(base, chosen, done[1:], planned - len(notebook.refused), dict(notebook.refused))
+        try_all(promising, 1 + len(singles))
+    report(planned, planned, f"{1 + len(trials)} trials")
+    result = Study(base, chosen, trials, planned - len(notebook.refused), dict(notebook.refused))
     notebook.finish(summary(result))
     return result
-
-
-def _words(settings: Mapping[str, Setting]) -> str:
-    return ", ".join(f"{axis} {setting.label}" for axis, setting in settings.items())
 
 
 _DECIDED = (
@@ -225,60 +200,6 @@ def _identity(config: SceneConfig) -> str:
     inputs = {key: {**value, "path": None} for key, value in hash_inputs(config).items()}
     text = json.dumps([_core.version(), json.loads(config.model_dump_json()), inputs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-class _Notebook:
-    """Trials on disk, written after each."""
-
-    def __init__(self, path: Path, identity: str) -> None:
-        self._path, self._identity = path, identity
-        self._trials: dict[str, Trial] = {}
-        self.refused: dict[str, str] = {}
-        if not path.exists():
-            return
-        try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            if data["identity"] != identity:
-                raise InputError(f"{path}: a study of another scene; give another folder with --out")
-            trials = [Trial.from_dict(trial) for trial in data["trials"]]
-            self.refused = dict(data["refused"])
-        except (OSError, ValueError, KeyError, TypeError) as failure:
-            if isinstance(failure, InputError):
-                raise
-            raise InputError(f"{path}: damaged, or not a study: {failure}") from None
-        self._trials = {_name(trial.settings): trial for trial in trials}
-
-    def find(self, settings: Mapping[str, Setting]) -> Trial | None:
-        return self._trials.get(_name({axis: setting.label for axis, setting in settings.items()}))
-
-    def refusal(self, settings: Mapping[str, Setting]) -> str | None:
-        return self.refused.get(_words(settings))
-
-    def refuse(self, settings: Mapping[str, Setting], reason: str) -> None:
-        self.refused[_words(settings)] = reason
-        self._write()
-
-    def keep(self, trial: Trial) -> None:
-        self._trials[_name(trial.settings)] = trial
-        self._write()
-
-    def finish(self, results: Mapping[str, Any]) -> None:
-        """Add what follows from the trials, for reports."""
-        self._write(results)
-
-    def _write(self, results: Mapping[str, Any] | None = None) -> None:
-        data = {
-            "identity": self._identity,
-            "library": _core.version(),
-            "trials": [trial.to_dict() for trial in self._trials.values()],
-            "refused": self.refused,
-            **(results or {}),
-        }
-        write_text(self._path, json.dumps(data, indent=1) + "\n")
-
-
-def _name(settings: Mapping[str, str]) -> str:
-    return json.dumps(sorted(settings.items()))
 
 
 @dataclass(frozen=True)
@@ -332,7 +253,7 @@ def _promising(
                 best = gain
                 front.append((ratios, gain, settings))
         for _, _, settings in _evenly(front, max(count // len(COSTS), 1)):
-            chosen.setdefault(_words(settings), settings)
+            chosen.setdefault(words_of(settings), settings)
     return list(chosen.values())
 
 

@@ -1,0 +1,122 @@
+"""A bake's seconds per view by stage beside those of [PEM], and drawing a view beside rendering it anew.
+
+The set-up is that of [PEM] §6, the teapot of 40,000 triangles in its room with maps of 256²×6, of whose 100 views
+one is baked. The paper's times, 15 minutes of ray tracing and 5.5 of inference a view, stand beside ours for what
+has become of them since 2001, not as a peer on the same machine. Then a mirror ball in a room is drawn from
+maps that were inferred for the view, and Mitsuba 3 renders the same view for as long as it takes to be as near
+to a reference of many samples.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks._mitsuba import mitsuba
+from benchmarks._report import Case, require, run, seconds
+from benchmarks.trace import EYE, FOV, SIZE, TARGET, mitsuba_room, our_scene
+from mirrorbake import _core as core
+from mirrorbake.bake.bake import bake
+from mirrorbake.pem.store import PemStore
+from mirrorbake.scene.load import load_config, parse_override
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "teapot-room.toml"
+VIEWS = 1
+PAPER_TRACE_S, PAPER_INFER_S = 15.0 * 60.0, 5.5 * 60.0
+TARGET_SAMPLES, REFERENCE_SAMPLES, PEER_SAMPLES = 128, 1024, 16
+
+
+def stages() -> Iterator[Case]:
+    """Seconds of a view in the middle of the paper's arc, without neighbours and without a static set."""
+    overrides = [
+        f"views.count={VIEWS}",
+        "views.start=49",
+        "views.degrees=0",
+        "static.views=0",
+        # What [PEM] traced and fitted: a set number of samples, every layer by itself.
+        "trace.noise=0",
+        "infer.fit='layers'",
+        "reflector.parts='split'",
+    ]
+    config = load_config(EXAMPLE, [parse_override(text) for text in overrides])
+    with tempfile.TemporaryDirectory() as folder:
+        bake(config, Path(folder) / "pem")
+        store = PemStore.open(Path(folder) / "pem")
+        timings = [store.read_timings(index) for index in range(VIEWS)]
+    for stage, ours, paper in (
+        ("ray tracing", sum(t.trace_s for t in timings) / VIEWS, PAPER_TRACE_S),
+        ("matrices and solving", sum(t.build_s + t.solve_s for t in timings) / VIEWS, PAPER_INFER_S),
+    ):
+        yield Case(f"the paper's teapot, {stage}", "s per view", ours, paper, "[PEM], 2001", 0.0, 0.0)
+
+
+def drawing() -> Iterator[Case]:
+    """A frame from maps, against path tracing to the same error."""
+    mesh = core.make_sphere((0, 1, 0), 0.7, 96)
+    scene = our_scene(mesh)
+    ball = len(scene.object_names) - 1
+    tracer = core.Tracer(scene, core.TracerOptions(indirect="path"))
+    camera = core.Camera(EYE, TARGET, vertical_fov_degrees=FOV, width=SIZE, height=SIZE)
+    model = core.run_time_model("Web")
+
+    def options(samples: int, seed: int) -> core.TraceOptions:
+        return core.TraceOptions(
+            samples_per_pixel=samples, max_specular_depth=64, max_diffuse_depth=64, seed=seed
+        )
+
+    targets = core.ViewTargets(SIZE, SIZE, 1, 2)
+    targets.add(tracer.trace_layers(camera, ball, options(TARGET_SAMPLES, 1)).samples)
+    lookups = tracer.trace_visibility(camera, ball, options(1, 0), model.places)
+    box = core.Proxy.box((0.0, 2.0, 0.0), (2.0, 2.0, 2.0), (0.0, 1.0, 0.0))
+    map_size = core.TexelTopology.cube(64)
+    texels, _ = core.fit_display(
+        [core.DisplayView(lookups, targets)], [[core.FitShell(box, 0)]], [map_size], run_time=model
+    )
+    maps = [[core.ShellMap(box, map_size, np.ascontiguousarray(np.asarray(texels)[:, :3]))]]
+    draw = partial(core.render_reflector, lookups, maps, None, model)
+
+    reference = np.asarray(tracer.trace_beauty(camera, options(REFERENCE_SAMPLES, 2)))
+    inside = np.asarray(draw())[..., 3] == 1.0
+
+    def error(image: Any) -> float:
+        # As benchmarks/trace.py: the worst 1 % are left out, for Mitsuba's fireflies.
+        square = ((image - reference)[inside] / np.maximum(reference[inside], 0.01)) ** 2
+        return float(np.sqrt(np.sort(square, axis=None)[: int(0.99 * square.size)].mean()))
+
+    ours = error(np.asarray(draw())[..., :3])
+    require(ours < 0.5, f"the maps are {ours:.0%} off")
+    took = seconds(draw)
+    peers = [(name, mitsuba(name)) for name in ("scalar_rgb", "llvm_ad_rgb")]
+    if all(mi is None for _, mi in peers):
+        print("no Mitsuba 3 here, so that there is nothing to draw against", file=sys.stderr)
+    for name, mi in peers:
+        if mi is None:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            loaded = mi.load_dict(mitsuba_room(mesh, mi, Path(folder)))
+
+        def render(mi: Any = mi, loaded: Any = loaded) -> Any:
+            return np.array(mi.render(loaded, spp=PEER_SAMPLES, seed=1))
+
+        theirs = error(render())
+        yield Case(
+            f"a mirror ball drawn from its maps, {SIZE}² pixels, time to our error", "s per frame", took,
+            seconds(render, 3) * (theirs / ours) ** 2, f"mitsuba {name}", ours, theirs,
+        )  # fmt: skip
+
+
+def cases() -> Iterator[Case]:
+    yield from stages()
+    yield from drawing()
+
+
+if __name__ == "__main__":
+    run("A bake by stage, and a frame from maps against Mitsuba 3.", cases)

@@ -174,8 +174,8 @@ def off_samples(pem: OpenedPem) -> float:
 def test_screens_of_their_own_are_better_away_from_the_samples(tmp_path: Path, three: OpenedPem) -> None:
     bake(parse_config(scene(tmp_path, TWO), "two"), tmp_path / "pem")
     two = off_samples(open_pem(tmp_path / "pem"))
-    # Of 28.5 and 29.8 dB: one box fits the screens or the floor and the sky, not all of them.
-    assert off_samples(three) > two + 0.8
+    # Of 26.9 and 29.8 dB: one shape fits the screens or the floor and the sky, not all of them.
+    assert off_samples(three) > two + 1.5
 
 
 def test_samples_of_three_shells_have_the_same_bits_in_any_order(tmp_path: Path, three: OpenedPem) -> None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mirrorbake.bake.bake import ProgressReport
 
 PAGE_QUALITY = 85
-"""Of the page's images: 1 dB less than the default, and a page of less than 3 MB."""
+"""Of the page's images: 1 dB less than the default, and a smaller page."""
 
 
 @reports_errors

@@ -1,10 +1,10 @@
 """A bake's seconds per view by stage beside those of [PEM], and drawing a view beside rendering it anew.
 
-The set-up is that of [PEM] §6, the teapot of 40,000 triangles in its room with maps of 256²×6, of whose 100 views
-one is baked. The paper's times, 15 minutes of ray tracing and 5.5 of inference a view, stand beside ours for what
-has become of them since 2001, not as a peer on the same machine. Then a mirror ball in a room is drawn from
-maps that were inferred for the view, and Mitsuba 3 renders the same view for as long as it takes to be as near
-to a reference of many samples.
+The set-up is that of [PEM] §6, the teapot of 40,000 triangles in its room with maps of 256²×6, of whose 100
+views one is baked. The paper's times, 15 minutes of ray tracing and 5.5 of inference a view, stand beside
+ours for what has become of them since 2001, not as a peer on the same machine. Then a mirror ball in a room
+is drawn from maps that were inferred for the view, and Mitsuba 3 renders the same view for as long as it
+takes to be as near to a reference of many samples.
 """
 
 from __future__ import annotations

@@ -117,8 +117,8 @@ file and, for a scene, its images, or the material libraries of an OBJ file and 
 each once, not those that do not exist. Raises FileError if `path` or a library is missing or corrupt.)");
 }
 
-void bind_textures(nb::class_<Scene>& scene) {
-  scene
+void bind_textures(nb::class_<Scene>& scene_type) {
+  scene_type
       .def(
           "texture_wrap",
           [](const Scene& scene, int texture) {
@@ -166,8 +166,8 @@ its parts, if it has more than one; `part_materials` gives each a material of it
           "Add a sphere that emits `radiance` (W sr⁻¹ m⁻²) outwards.");
 }
 
-void bind_lights(nb::class_<Scene>& scene) {
-  scene
+void bind_lights(nb::class_<Scene>& scene_type) {
+  scene_type
       .def(
           "add_directional_light",
           [](Scene& scene, glm::vec3 direction, glm::vec3 irradiance) {
@@ -212,8 +212,8 @@ its centre looks along −Z, +X is to the right of the centre, +Y is the top row
 object, or, if there are more than `most_parts`, what is of one material.)");
 }
 
-void bind_contents(nb::class_<Scene>& scene) {
-  scene.def_prop_ro("object_names", [](const Scene& scene) { return names(scene.objects); })
+void bind_contents(nb::class_<Scene>& scene_type) {
+  scene_type.def_prop_ro("object_names", [](const Scene& scene) { return names(scene.objects); })
       .def_prop_ro("material_names", [](const Scene& scene) { return names(scene.materials); })
       .def(
           "object_mesh",
@@ -283,11 +283,11 @@ void bind_contents(nb::class_<Scene>& scene) {
 }
 
 void bind_scene_class(nb::module_& m) {
-  nb::class_<Scene> scene(
+  nb::class_<Scene> scene_type(
       m, "Scene",
       R"(Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours
 and radiance are scene-linear with Rec.709 primaries. The add_ functions return the new thing's index.)");
-  scene.def(nb::init<>())
+  scene_type.def(nb::init<>())
       .def(
           "translate",
           [](Scene& scene, std::array<double, 3> by) {
@@ -332,9 +332,9 @@ cache of bounded size. Raises FileError if the file is missing, damaged or has v
           nb::arg("texture"),
           R"(Copy of a texture's texels, (height, width, 3), or (height, width, 1) for one channel that
 stands for all three; scene-linear, row 0 at the top. Raises FileError if its file has changed.)");
-  bind_textures(scene);
-  bind_lights(scene);
-  bind_contents(scene);
+  bind_textures(scene_type);
+  bind_lights(scene_type);
+  bind_contents(scene_type);
 }
 
 }  // namespace

@@ -28,8 +28,8 @@ std::span<const glm::vec3> points(const PointArray& array) {
   return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
 }
 
-void bind_tracing(nb::class_<Tracer>& tracer) {
-  tracer
+void bind_tracing(nb::class_<Tracer>& tracer_type) {
+  tracer_type
       .def(
           "trace_layers",
           [](const Tracer& tracer, const Camera& camera, const std::vector<int>& reflectors,
@@ -100,8 +100,8 @@ hidden: collections.abc.Sequence[int] = ..., options: TraceOptions = ...) -> NDA
 through the objects in `hidden`, whose shadows and reflections on other things remain.)");
 }
 
-void bind_gathering(nb::class_<Tracer>& tracer) {
-  tracer
+void bind_gathering(nb::class_<Tracer>& tracer_type) {
+  tracer_type
       .def(
           "intersect",
           [](const Tracer& tracer, PointArray origins, PointArray directions,
@@ -166,8 +166,8 @@ NDArray[numpy.float32])">(),
 }
 
 void bind_camera(nb::module_& m) {
-  nb::class_<Camera> camera(m, "Camera", "A pinhole camera. Pixel (0,0) is the top left one.");
-  camera
+  nb::class_<Camera> camera_type(m, "Camera", "A pinhole camera. Pixel (0,0) is the top left one.");
+  camera_type
       .def(
           "__init__",
           [](Camera* self, glm::vec3 eye, glm::vec3 target, glm::vec3 up, float vertical_fov_degrees,
@@ -193,7 +193,7 @@ void bind_camera(nb::module_& m) {
                ", vertical_fov_degrees=" + text_of(c.vertical_fov_degrees) +
                ", width=" + std::to_string(c.width) + ", height=" + std::to_string(c.height) + ")";
       });
-  pickle(camera, {"eye", "target", "up", "vertical_fov_degrees", "width", "height"});
+  pickle(camera_type, {"eye", "target", "up", "vertical_fov_degrees", "width", "height"});
 }
 
 void bind_tracer_options(nb::module_& m) {
@@ -342,10 +342,10 @@ of a pixel's covered samples, estimated.)");
 }
 
 void bind_tracer_class(nb::module_& m) {
-  nb::class_<Tracer> tracer(
+  nb::class_<Tracer> tracer_type(
       m, "Tracer",
       "A scene made ready for tracing. Same arguments give the same bits on any number of threads.");
-  tracer
+  tracer_type
       .def(
           "__init__",
           [](Tracer* self, const Scene& scene, const TracerOptions& options) {
@@ -385,8 +385,8 @@ of `noise`, at most options.samples_per_pixel.)")
            signature<R"(def trace_layers(self, camera: Camera, reflector: int,
 options: TraceOptions = ...) -> LayerTrace)">(),
            "Layers of object number `reflector`, whose material must be specular.");
-  bind_tracing(tracer);
-  bind_gathering(tracer);
+  bind_tracing(tracer_type);
+  bind_gathering(tracer_type);
 }
 
 }  // namespace

@@ -120,11 +120,12 @@ def test_every_axis_starts_with_the_scenes_own_choice() -> None:
 
 def test_a_mesh_of_one_part_is_cut_and_one_view_has_no_spacing(tmp_path: Path) -> None:
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    scene = {**SCENE, "reflector": {"mesh": str(tmp_path / "flat.obj")}, "views": {"count": 1}}
+    scene = {**SCENE, "views": {"count": 1}}
+    scene["reflector"] = {"mesh": str(tmp_path / "flat.obj"), "parts": "joined"}
     axes = {axis.name: axis for axis in axes_of(prepare_stage(parse_config(scene, "scene")))}
     assert not {"spacing", "blending", "shared"} & axes.keys()
     labels = [setting.label for setting in axes["parts"].settings]
-    assert labels == ["as planned", "joined", "split", "4", "8"]
+    assert labels == ["joined", "split", "4", "8"]
 
 
 def test_spacing_keeps_the_middle_of_the_arc() -> None:

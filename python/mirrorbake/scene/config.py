@@ -321,8 +321,7 @@ class SceneConfig(Section):
     """None: the light stays as it is."""
     layers: Layers = Layers()
     shells: Annotated[Shells | None, BeforeValidator(as_tuple), *AUTO] = None
-    """[[shells]], front to back. "auto": `local`, the object itself, and the rest, with what else has a shape
-    of its own and pays."""
+    """[[shells]], front to back. "auto": `local`, the object where it is seen in itself, and the rest."""
     maps: Maps = Maps()
     trace: Trace = Trace()
     infer: Infer = Infer()

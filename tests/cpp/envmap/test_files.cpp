@@ -392,11 +392,14 @@ TEST_F(EnvMapFiles, APanoramaIsRecognisedByItsShapeWhateverCubeItIs) {
     const Image panorama = load_panorama(path(name)).image;
     ASSERT_EQ(panorama.width, 256) << name;
     for (std::size_t i = 0; i < panorama.pixels.size(); ++i) {
-      ASSERT_NEAR(panorama.pixels[i], expected.values[i], 0.01F) << name << ' ' << i;
+      ASSERT_NEAR(panorama.pixels[i], std::max(expected.values[i], 0.0F), 0.01F) << name << ' ' << i;
     }
   }
   save_envmap(path("sky.exr"), expected, FaceLayout::automatic, PixelFormat::float32);
-  EXPECT_EQ(load_panorama(path("sky.exr")).image.pixels, expected.values);
+  const Panorama sky = load_panorama(path("sky.exr"));
+  for (std::size_t i = 0; i < expected.values.size(); ++i) {
+    ASSERT_EQ(sky.image.pixels[i], std::max(expected.values[i], 0.0F)) << i;
+  }
 }
 
 TEST_F(EnvMapFiles, APictureThatIsNoPanoramaIsNoLight) {
@@ -422,7 +425,7 @@ TEST_F(EnvMapFiles, APanoramaIsFiniteAndNowhereBelow0) {
   EXPECT_EQ(panorama.image.pixels, (std::vector<float>{1, 0, 3, 0, 5, 6}));
   EXPECT_EQ(panorama.negative, 2U);
   image.pixels[4] = std::numeric_limits<float>::infinity();
-  save_image(path("glows.exr"), image);
+  save_image(path("glows.exr"), image, PixelFormat::float32);
   EXPECT_THROW(load_panorama(path("glows.exr")), FileError);
 }
 

@@ -402,7 +402,7 @@ struct Defect {
   std::function<void(Document&)> make;
 };
 
-class GltfDefects : public GltfSceneFile {
+class GltfSceneDefects : public GltfSceneFile {
  protected:
   void expect_named(const std::vector<Defect>& defects) {
     for (const Defect& defect : defects) {
@@ -414,7 +414,7 @@ class GltfDefects : public GltfSceneFile {
   }
 };
 
-TEST_F(GltfDefects, OfMaterialsAndTexturesAreNamed) {
+TEST_F(GltfSceneDefects, OfMaterialsAndTexturesAreNamed) {
   const auto material = [](const std::string& text) {
     return [text](Document& d) { d.materials = "[" + text + "]"; };
   };
@@ -472,7 +472,7 @@ TEST_F(GltfDefects, OfMaterialsAndTexturesAreNamed) {
   expect_named(defects);
 }
 
-TEST_F(GltfDefects, OfLightsCamerasAndNodesAreNamed) {
+TEST_F(GltfSceneDefects, OfLightsCamerasAndNodesAreNamed) {
   const auto light = [](const std::string& node, const std::string& text) {
     return [=](Document& d) {
       d.nodes = R"([{"mesh":0},{)" + node + R"("extensions":{"KHR_lights_punctual":{"light":0}}}])";

@@ -239,7 +239,7 @@ def test_an_object_of_a_gltf_scene_is_baked_where_it_stands(tmp_path: Path) -> N
     assert pem is not None
     assert static is not None
     # Facets of an octahedron are flat mirrors: what stands near is far from where an infinite map has it.
-    assert pem > 25.0
+    assert pem > 24.5
     assert pem > static + 3.0
 
 

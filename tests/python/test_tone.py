@@ -41,7 +41,7 @@ def test_painted_colours_stay_and_bright_ones_never_pass_white() -> None:
 
 def test_exposure_is_in_stops_and_unknown_names_are_refused() -> None:
     np.testing.assert_array_equal(displayed(np.full((1, 3), 0.25, np.float32), 1.0, "none"), 0.5)
-    with pytest.raises(OptionError, match="tone = 'filmic': expected none or neutral"):
+    with pytest.raises(OptionError, match="tone-map = 'filmic': expected none or neutral"):
         displayed(np.zeros((1, 3), np.float32), 0.0, "filmic")
     with pytest.raises(OptionError, match="exposure = 21: expected -20 to 20"):
         displayed(np.zeros((1, 3), np.float32), 21.0, "none")

@@ -44,7 +44,7 @@ def test_without_the_library_for_other_files_exr_works_and_png_says_what_is_miss
     mb_envmap("convert", panorama, "--to", "latlong", "--size", 16, "-o", tmp_path / "small.exr")
     png = tmp_path / "small.png"
     message = mb_envmap("convert", panorama, "--to", "latlong", "--size", 16, "-o", png, status=3)
-    assert "libmirrorbake_openimageio.so: is needed for HDR, TIFF, PNG and JPEG files" in message
+    assert "libmirrorbake_openimageio.so: is needed for TIFF, PNG and JPEG files" in message
     assert "file too short" in message  # the loader's reason
     assert not png.exists()
 

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <random>
 #include <string>
+#include <utility>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -255,8 +256,9 @@ Colouring colour_texels(const RenderingMatrix& candidates, int most) {
   std::vector<std::uint32_t> order(candidates.rows());
   std::iota(order.begin(), order.end(), 0U);
   // Neighbours in the image stay together: what colours one of them used serves the next.
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return length(a) / 32 < length(b) / 32; });
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(length(a) / 32, a) < std::pair(length(b) / 32, b);
+  });
   for (const std::uint32_t row : order) {
     if (length(row) > static_cast<std::uint64_t>(most)) break;
     for (std::uint64_t e = candidates.row_offsets[row]; e < candidates.row_offsets[row + 1]; ++e) {

@@ -21,6 +21,7 @@ from mirrorbake.bake.probe import (
 from mirrorbake.bake.quality import QUALITIES, quality_decisions
 from mirrorbake.bake.shell_shapes import (
     MIN_HITS,
+    choose_shape,
     planned_shells,
     reflector_origin,
     shell_distances,
@@ -28,7 +29,7 @@ from mirrorbake.bake.shell_shapes import (
 )
 from mirrorbake.bake.worth import advice_of, shared_distant
 from mirrorbake.errors import InputError
-from mirrorbake.proxy import choose_proxy, hull_triangles, proxy_to_attributes
+from mirrorbake.proxy import hull_triangles, proxy_to_attributes
 from mirrorbake.scene.config_shells import DEFAULT_SHELLS, ITSELF
 from mirrorbake.scene.plan import Decision, Plan
 
@@ -244,13 +245,7 @@ def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
             )
         reason = "the object sees no surroundings at a distance"
         return Decision("maps.distant", None, "infinite", True, reason, None), _core.Proxy.infinite(origin)
-    choice = choose_proxy(
-        np.ascontiguousarray(probe.position[usable]),
-        np.ascontiguousarray(probe.reflection[usable]),
-        np.ascontiguousarray(distances[usable]),
-        np.ascontiguousarray(probe.view[usable]),
-        origin,
-    )
+    choice = choose_shape(probe, distances, usable, origin)
     best = choice.best
     if wanted is not None:
         best = next(candidate for candidate in choice.candidates if candidate.name == wanted)

@@ -108,6 +108,15 @@ def plane_through(hits: NDArray[np.floating], origin: Sequence[float]) -> tuple[
     return _core.Proxy.hemisphere(foot.tolist(), radius, list(origin), own), thickness
 
 
+def choose_shape(
+    probe: Probe, distances: FloatArray, used: NDArray[np.bool_], origin: Sequence[float]
+) -> _core.ProxyChoice:
+    """Compare all shapes for a map by what some of a probe's rays (n,) meet, at distances (n,) in metres."""
+    return choose_proxy(
+        probe.position[used], probe.reflection[used], distances[used], probe.view[used], origin
+    )
+
+
 def fit_shape(stage: Stage, probe: Probe, shell: int, wanted: str) -> _core.Proxy:
     """Fit the shape of a shell that is not the last.
 
@@ -137,13 +146,7 @@ def fit_shape(stage: Stage, probe: Probe, shell: int, wanted: str) -> _core.Prox
             raise InputError(
                 f"shells.{name}: proxy = 'plane': the plane through what it holds passes through the object"
             )
-    choice = choose_proxy(
-        np.ascontiguousarray(probe.position[met]),
-        np.ascontiguousarray(probe.reflection[met]),
-        np.ascontiguousarray(distances[met]),
-        np.ascontiguousarray(probe.view[met]),
-        origin,
-    )
+    choice = choose_shape(probe, distances, met, origin)
     if wanted == "auto":
         return choice.best.proxy
     return next(candidate.proxy for candidate in choice.candidates if candidate.name == wanted)

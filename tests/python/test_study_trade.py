@@ -12,9 +12,11 @@ from typer.testing import CliRunner
 from mirrorbake import _core
 from mirrorbake.bake.bake import bake
 from mirrorbake.commands.main import app
+from mirrorbake.envmap import EnvMap
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.pyramid import join_pyramid, split_pyramid
+from mirrorbake.projection import texel_directions
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.study.trade import maps, show
@@ -58,7 +60,7 @@ def test_decimated_levels_are_a_stored_map_without_residuals() -> None:
     np.testing.assert_array_equal(maps.LEVELS[0].apply(texels, 16, pyramid(3)), expected)
 
 
-@pytest.mark.parametrize("levels", maps.LEVELS, ids=lambda levels: levels.name)
+@pytest.mark.parametrize("levels", [*maps.LEVELS, *maps.PREFILTERS], ids=lambda levels: levels.name)
 @pytest.mark.parametrize("channels", [3, 4])
 def test_made_levels_keep_the_finest_and_a_constant(levels: maps.Levels, channels: int) -> None:
     texels = pyramid(channels)
@@ -68,6 +70,16 @@ def test_made_levels_keep_the_finest_and_a_constant(levels: maps.Levels, channel
     grey = np.full_like(texels, 0.25)
     capture = np.full_like(pyramid(3), 0.25)
     np.testing.assert_allclose(levels.apply(grey, 16, capture), grey, atol=1e-6)
+
+
+@pytest.mark.parametrize("prefilter", maps.PREFILTERS, ids=lambda levels: levels.name)
+def test_lobes_as_wide_as_texels_average_what_texels_average(prefilter: maps.Levels) -> None:
+    height = np.stack([texel_directions("cube", 16, 16, face) for face in range(6)])[..., 1:2]
+    finest = np.repeat(1.0 + 0.9 * height, 3, axis=3).astype(np.float32)
+    texels = EnvMap.from_array(finest, "cube").mips("solid_angle")
+    for level, lobes in enumerate(prefilter.coarser(finest, pyramid(3))[:2], start=1):
+        # A lobe has one width, but texels of a cube have not: those of 8 and 4 along a face.
+        np.testing.assert_allclose(lobes, texels.level(level), atol=0.04)
 
 
 def test_captured_levels_are_those_of_the_capture() -> None:

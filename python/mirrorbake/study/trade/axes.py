@@ -155,6 +155,11 @@ def _levels(config: SceneConfig) -> Axis:
     return Axis("levels", "coarser levels of the maps", tuple(settings))
 
 
+def _prefilter(config: SceneConfig) -> Axis:
+    settings = [Setting("inferred"), *(Setting(levels.name, levels=levels) for levels in maps.PREFILTERS)]
+    return Axis("prefilter", "prefiltering of the coarser levels", tuple(settings))
+
+
 def _storage(config: SceneConfig) -> Axis:
     other = "float32" if config.maps.precision == "float16" else "float16"
     settings = [Setting(config.maps.precision), Setting(other, {"maps.precision": other})]
@@ -200,6 +205,7 @@ _SHAPES = ["infinite", "sphere", "box", "ellipsoid"]
 _AXES: tuple[Callable[[SceneConfig], Axis | None], ...] = (
     _of_key("size", "texels along a face", "maps.size", _sizes),
     _levels,
+    _prefilter,
     _storage,
     _of_key("projection", "projection of the maps", "maps.projection", lambda own: ["cube", "paraboloid"]),
     _of_key("geometry", "geometry of the distant map", "maps.distant", lambda own: _SHAPES),
@@ -233,7 +239,7 @@ _AXES: tuple[Callable[[SceneConfig], Axis | None], ...] = (
 _DRAWN_AXES: tuple[Callable[[Stage], Axis | None], ...] = (_filter, _coordinates, _fresnel)
 
 AXIS_NAMES = (
-    *("size", "levels", "storage", "projection", "geometry", "shells", "parts", "shared"),
+    *("size", "levels", "prefilter", "storage", "projection", "geometry", "shells", "parts", "shared"),
     *("samples", "noise", "spacing", "blending", "run_time", "filter", "coordinates", "fresnel"),
     *("fit", "neighbours", "passes", "footprint", "smoothness", "prior", "prior_weight", "iterations"),
 )

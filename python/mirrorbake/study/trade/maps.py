@@ -10,12 +10,14 @@ import numpy as np
 
 from mirrorbake.envmap import EnvMap
 from mirrorbake.pem.pyramid import coarser_sizes, decimate
+from mirrorbake.prefilter.convolve import Prefilter, ggx, phong
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
+    from mirrorbake import _core
     from mirrorbake.arrays import FloatArray
 
 LOG_FLOOR = 2.0**-8
@@ -74,6 +76,39 @@ LEVELS = (
     Levels("captured", _captured),
 )
 """Means of 2×2 texels; filtered by solid angle and across edges; those of the captured map."""
+
+
+def _wide_as_texels(size: int) -> float:
+    """Phong exponent of the lobe that scatters as far as a texel in the middle of a face of so many."""
+    # A box of width w has the variance w²/12, cos^N the variance 1/N along each axis; w = π/2 / size.
+    return max(48.0 * (size / np.pi) ** 2, 1.0)
+
+
+def _ggx_alpha(exponent: float) -> float:
+    """α of the GGX lobe whose half of the light lies within the same angle as that of a Phong exponent."""
+    # 1 − exp(−N γ²/2) = ½, and tan(γ/2) = α for GGX seen along its normal.
+    return float(np.clip(np.tan(0.5 * np.sqrt(2.0 * np.log(2.0) / exponent)), 0.01, 1.0))
+
+
+def _convolved(lobe: Callable[[float], _core.Lobe]) -> Callable[[FloatArray, FloatArray], list[FloatArray]]:
+    """Levels convolved from the finest by the lobe of a Phong exponent, as image-based lighting has them."""
+
+    def coarser(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
+        projection = "cube" if len(finest) == 6 else "dual_paraboloid"
+        convolver = Prefilter(EnvMap.from_array(finest, projection))
+        return [
+            convolver.apply(lobe(_wide_as_texels(size)), size, projection).level(0)
+            for size in coarser_sizes(finest.shape[1])
+        ]
+
+    return coarser
+
+
+PREFILTERS = (
+    Levels("Phong's lobe", _convolved(phong)),
+    Levels("GGX lobe", _convolved(lambda exponent: ggx(_ggx_alpha(exponent)))),
+)
+"""Convolved with lobes as wide as the level's texels."""
 
 
 @dataclass(frozen=True)

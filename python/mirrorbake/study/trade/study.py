@@ -241,7 +241,8 @@ def _promising(
     foretold = []
     for choice in itertools.product(*([None, *moves] for moves in options)):
         taken = [move for move in choice if move is not None]
-        if len(taken) > 1:
+        makers = sum(move.setting.levels is not None for move in taken)
+        if len(taken) > 1 and makers < 2:
             gain = sum(move.gain for move in taken)
             ratios = tuple(sum(move.octaves[cost] for move in taken) for cost in range(len(COSTS)))
             foretold.append((ratios, gain, {move.axis: move.setting for move in taken}))

@@ -9,12 +9,14 @@ from http.server import ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
 import pytest
 
 from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.viewer.export import write_folder, write_single_file
 from mirrorbake.viewer.page import is_built
 from mirrorbake.viewer.server import Content, byte_range, make_server
+from mirrorbake.viewer.text import text_of_bytes
 from viewer_cases import CasePem, case_scene, case_source, cases
 
 pytestmark = pytest.mark.skipif(
@@ -171,6 +173,29 @@ def test_a_folder_that_holds_something_else_is_left_alone(pem: WebPem, tmp_path:
     with pytest.raises(ValueError, match="holds no page"):
         write_folder(pem, "title", tmp_path, lambda done, total, text: None)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+# What the page's bytesOfText reads; its own test has the same table.
+TEXTS = [
+    (b"", ""),
+    (b"\xff\xff", "\x7f\x7f`"),
+    (b"\0\0\0", "\x80\x80"),
+    (b"\x14\x28\x50\xa1\x42", "\u010a\u010a\u0108"),
+    (b"\x78\xf1\xe3\xc7\x8f\x1e\x3c", "\u02bc\u02bc\u02bc\u02bc"),
+    (b'"<\\\r\n\0\xe2\x80\xa8', "\x11\x0f\x0b@h(\x01b@*\x80"),
+]
+
+
+@pytest.mark.parametrize(("data", "text"), TEXTS)
+def test_bytes_in_a_page_are_the_text_that_the_page_reads(data: bytes, text: str) -> None:
+    assert text_of_bytes(data) == text
+
+
+def test_bytes_in_a_page_take_a_seventh_more_and_need_no_escapes() -> None:
+    data = np.random.default_rng(5).bytes(70_000)
+    text = text_of_bytes(data)
+    assert len(text.encode("utf-8")) <= 80_002
+    assert not set('\0\n\r"<\\') & set(text)
 
 
 def test_a_single_file_holds_the_first_picture_in_its_first_third(pem: WebPem, tmp_path: Path) -> None:

@@ -37,7 +37,6 @@ from mirrorbake.viewer.export import write_folder
 if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
 
-MAP_SIZE = 32
 WIDTH, HEIGHT, FOV = 320, 240, 30.0
 DISTANCE, ELEVATION = 0.6, 20.0
 PARAMETERS = (0.0, 0.5, 1.0)
@@ -64,6 +63,9 @@ class Case:
     """There is a static set, to which the PEM fades."""
     projection: Projection = "cube"
     run_time: _core.RunTimeModel = field(default_factory=lambda: _core.run_time_model("Web"))
+    segments: int = 40
+    """Around the ring; 320 make triangles smaller than a pixel."""
+    map_size: int = 32
 
 
 MAPS = (4, 3, 3, 4)
@@ -138,6 +140,14 @@ def _cube_cases() -> list[Case]:
             schlick,
             between=_core.Proxy.ellipsoid((0, 0.1, 0), (0.5, 0.3, 0.4), origin, turned),
         ),
+        Case(
+            "small-triangles",
+            _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, straight),
+            local,
+            schlick,
+            segments=320,
+            map_size=128,
+        ),
         Case("fading", _core.Proxy.infinite(origin), local, schlick, fade_degrees=10.0),
     ]
 
@@ -170,13 +180,13 @@ def _bumps() -> FloatArray:
     return (0.5 + 0.5 * lean).astype(np.float32)
 
 
-def _maps(seed: int, channels: int, projection: Projection = "cube") -> FloatArray:
+def _maps(seed: int, channels: int, size: int, projection: Projection = "cube") -> FloatArray:
     """A pyramid of smooth colours with some noise on every level of its own: wrong levels are seen."""
     random = np.random.default_rng(seed)
     levels = []
     phase = random.uniform(0.0, 2.0 * math.pi, (channels, 3))
-    for level in range(MAP_SIZE.bit_length()):
-        n = MAP_SIZE >> level
+    for level in range(size.bit_length()):
+        n = size >> level
         centres = (np.arange(n) + 0.5) / n
         faces = np.arange(FACES[projection])
         f, t, s = np.meshgrid(faces, centres, centres, indexing="ij")
@@ -209,7 +219,7 @@ class Scene:
 
 def case_scene(case: Case, t: float = 0.0) -> Scene:
     torus, ball = (
-        _core.make_torus((0.0, 0.1, 0.0), 0.12, 0.04, 40),
+        _core.make_torus((0.0, 0.1, 0.0), 0.12, 0.04, case.segments),
         _core.make_sphere((0.0, 0.13, 0.0), 0.06, 32),
     )
     first = np.asarray(torus.positions)
@@ -284,12 +294,12 @@ def _eye(t: float, raised: float) -> tuple[float, float, float]:
 class CasePem:
     """The maps of a case as the page gets them: rounded to codes."""
 
-    def __init__(self, projection: Projection = "cube") -> None:
+    def __init__(self, projection: Projection = "cube", size: int = 32) -> None:
         self.projection = projection
         self.code = RadianceCode.for_range(2.0, 3.6)
         # The last "sample" is the static set.
         self._maps = [
-            [_maps(97 * sample + 13 * m, channels, projection) for m, channels in enumerate(MAPS)]
+            [_maps(97 * sample + 13 * m, channels, size, projection) for m, channels in enumerate(MAPS)]
             for sample in range(len(PARAMETERS) + 1)
         ]
 
@@ -324,7 +334,7 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
         space=ParameterSpace((Axis("motion" if case.moves else "arc", PARAMETERS, 0.0, 1.0),)),
         motion=MOTION if case.moves else None,
         projection=case.projection,
-        maps=tuple(MapEntry(f"map {m}", MAP_SIZE, opaque=MAPS[m] == 3) for m in range(count)),
+        maps=tuple(MapEntry(f"map {m}", case.map_size, opaque=MAPS[m] == 3) for m in range(count)),
         pyramid=pem.pyramid,
         static_maps=None if case.fade_degrees is None else tuple(pem.static_maps[:count]),
         fade_degrees=case.fade_degrees,
@@ -332,9 +342,9 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
         mesh=scene.mesh,
         materials=scene.materials,
         irradiance=(lambda sample: irradiance(case, scene.mesh.normals, sample)) if case.moves else None,
-        static=_maps(1234, 3, case.projection),
+        static=_maps(1234, 3, case.map_size, case.projection),
         static_proxy=distant,
-        static_size=MAP_SIZE,
+        static_size=case.map_size,
         camera={
             "kind": "fixed" if case.moves else "arc",
             "target": [0.0, 0.1, 0.0],
@@ -374,7 +384,7 @@ def reference(case: Case, pem: CasePem, code: RadianceCode, t: float, raised: fl
         return fade * ((1 - weight) * a + weight * b) + (1 - fade) * static
 
     local = proxy_from_attributes(moved_proxy(proxy_to_attributes(case.local), pose))
-    layout = topology_of(case.projection, MAP_SIZE)
+    layout = topology_of(case.projection, case.map_size)
     stacked = scene.mesh.whole_stack.astype(np.uint8)
     distant = _core.ShellMap(case.distant, layout, blended(1))
     parts = [
@@ -392,7 +402,7 @@ def reference(case: Case, pem: CasePem, code: RadianceCode, t: float, raised: fl
 
 def write_case(case: Case, folder: Path, image_format: ImageFormat) -> None:
     """Write the export and the reference pictures of a case."""
-    scene, pem = case_scene(case), CasePem(case.projection)
+    scene, pem = case_scene(case), CasePem(case.projection, case.map_size)
     source = case_source(case, scene, pem)
     web = WebPem(source, WebOptions(image_format))
     write_folder(web, case.name, folder, lambda done, total, text: None)

@@ -1,6 +1,7 @@
 /// Where the page's files come from: beside it on a server, or inside it.
 
 import { UserError } from "./errors";
+import { bytesOfText } from "./text";
 
 export interface Files {
   read(name: string): Promise<ArrayBuffer>;
@@ -27,33 +28,36 @@ export class ServedFiles implements Files {
   }
 }
 
-/// Files inside the page, each in a script that calls `mirrorbakeFile(name, base64)` once it has arrived, so that the page can
-/// begin with the first ones while the others are still on their way.
+/// A file inside the page: so many bytes, as `bytesOfText` reads them.
+interface Arrived {
+  count: number;
+  text: string;
+}
+
+/// Files inside the page, each in a script that calls `mirrorbakeFile(name, count, text)` once it has arrived, so that the page
+/// can begin with the first ones while the others are still on their way.
 export class EmbeddedFiles implements Files {
-  private readonly arrived = new Map<string, string>();
-  private readonly waiting = new Map<string, ((text: string) => void)[]>();
+  private readonly arrived = new Map<string, Arrived>();
+  private readonly waiting = new Map<string, ((file: Arrived) => void)[]>();
 
   constructor() {
     const global = window as unknown as {
-      mirrorbakeFile: (name: string, text: string) => void;
-      mirrorbakeArrived?: [string, string][];
+      mirrorbakeFile: (name: string, count: number, text: string) => void;
     };
-    const arrive = (name: string, text: string) => {
-      this.arrived.set(name, text);
-      for (const resolve of this.waiting.get(name) ?? []) resolve(text);
+    global.mirrorbakeFile = (name, count, text) => {
+      const file = { count, text };
+      this.arrived.set(name, file);
+      for (const resolve of this.waiting.get(name) ?? []) resolve(file);
       this.waiting.delete(name);
     };
-    for (const [name, text] of global.mirrorbakeArrived ?? []) arrive(name, text);
-    global.mirrorbakeFile = arrive;
   }
 
   async read(name: string): Promise<ArrayBuffer> {
-    const text = this.arrived.get(name) ?? (await this.wait(name));
-    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-    return bytes.buffer;
+    const { count, text } = this.arrived.get(name) ?? (await this.wait(name));
+    return bytesOfText(text, count).buffer;
   }
 
-  private wait(name: string): Promise<string> {
+  private wait(name: string): Promise<Arrived> {
     return new Promise((resolve, reject) => {
       const lost = () => {
         if (!this.arrived.has(name)) {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 import html
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mirrorbake.errors import InputError
+from mirrorbake.viewer.text import text_of_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -75,6 +75,6 @@ def page_with_files(title: str, pem: WebPem) -> Iterator[str]:
     yield '<div id="viewer" data-data="embedded"></div>\n' + _NO_SCRIPT
     yield f"<script>{script}</script>\n"
     for name in pem.names:
-        text = base64.b64encode(pem.read(name)).decode()
-        yield f'<script>mirrorbakeFile({json.dumps(name)},"{text}")</script>\n'
+        data = pem.read(name)
+        yield f'<script>mirrorbakeFile({json.dumps(name)},{len(data)},"{text_of_bytes(data)}")</script>\n'
     yield "</body>\n</html>\n"

@@ -391,6 +391,9 @@ export class Renderer {
     gl.uniform3fv(program.at("uOffset"), frame.offset);
     gl.uniform3fv(program.at("uEye"), view.eye);
     gl.uniform3fv(program.at("uForward"), view.forward);
+    gl.uniform3fv(program.at("uMiddle"), view.middle);
+    gl.uniform2f(program.at("uPixels"), frame.width, frame.height);
+    gl.uniform2f(program.at("uPlace"), place[0], place[1]);
     gl.uniform3fv(program.at("uRight"), view.right);
     gl.uniform3fv(program.at("uDown"), view.down);
     gl.uniform1f(program.at("uFootprint"), frame.footprint);

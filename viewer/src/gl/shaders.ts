@@ -259,8 +259,11 @@ out vec4 oColour;
 ${READS}
 uniform vec3 uEye;
 uniform vec3 uForward;  // normal of the image plane
-uniform vec3 uRight;    // one pixel to the right on the plane at distance 1
+uniform vec3 uMiddle;   // from the eye to the middle of the image on the plane at distance 1
+uniform vec3 uRight;    // one pixel to the right on that plane
 uniform vec3 uDown;     // one pixel down
+uniform vec2 uPixels;
+uniform vec2 uPlace;    // of the lookup in its pixel, from the top left corner
 uniform float uFootprint;
 uniform bool uFlat;
 
@@ -398,19 +401,41 @@ vec4 readShell(int shell, vec3 p, vec3 r, vec3 pdx, vec3 rdx, vec3 pdy, vec3 rdy
 }
 
 void main() {
-  vec3 toEye = uEye - vPosition;
-  float range = length(toEye);
-  vec3 view = toEye / range;
   vec3 px = dFdx(vPosition), py = dFdy(vPosition);
   vec3 nx = dFdx(vNormal), ny = dFdy(vNormal);
   vec2 ux = dFdx(vUv), uy = dFdy(vUv);
+  vec3 ix = dFdx(vIrradiance), iy = dFdy(vIrradiance);
+  float e11 = dot(px, px), e12 = dot(px, py), e22 = dot(py, py);
+  float determinant = e11 * e22 - e12 * e12;
   vec3 g = cross(px, py);
-  g = length(g) > 0.0 ? normalize(g) : view;
+  g = length(g) > 0.0 ? normalize(g) : normalize(uEye - vPosition);
+
+  // Rasterisers put vertices on a grid of 1/16 to 1/256 of a pixel, and small triangles then show a point beside the one that
+  // the pixel's ray meets. What is interpolated is linear in the triangle's plane: go on to where the ray meets that.
+  vec2 pixel = vec2(gl_FragCoord.x, uPixels.y - gl_FragCoord.y) - 0.5 + uPlace - 0.5 * uPixels;
+  vec3 ray = uMiddle + pixel.x * uRight + pixel.y * uDown;
+  float facing = dot(ray, g);
+  vec3 aside = facing != 0.0 ? ray * (dot(vPosition - uEye, g) / facing) - (vPosition - uEye) : vec3(0.0);
+  vec2 pixels = vec2(0.0);
+  if (determinant > 0.0) {
+    float p1 = dot(aside, px), p2 = dot(aside, py);
+    pixels = vec2(p1 * e22 - p2 * e12, p2 * e11 - p1 * e12) / determinant;
+  }
+  // Farther than any grid puts it: an edge-on triangle, of which nothing is known.
+  if (!(max(abs(pixels.x), abs(pixels.y)) < 0.25)) pixels = vec2(0.0);
+  vec3 position = vPosition + pixels.x * px + pixels.y * py;
+  vec3 normal = vNormal + pixels.x * nx + pixels.y * ny;
+  vec2 uv = vUv + pixels.x * ux + pixels.y * uy;
+  vec3 irradiance = max(vIrradiance + pixels.x * ix + pixels.y * iy, 0.0);
+
+  vec3 toEye = uEye - position;
+  float range = length(toEye);
+  vec3 view = toEye / range;
   if (dot(g, view) < 0.0) g = -g;
   float side = gl_FrontFacing ? 1.0 : -1.0;
-  float normalLength = max(length(vNormal), 1e-6);
+  float normalLength = max(length(normal), 1e-6);
   vec3 front = side * g;
-  vec3 outside = frontNormal(vNormal, front, vUv, px, py, ux, uy);
+  vec3 outside = frontNormal(normal, front, uv, px, py, ux, uy);
   vec3 n = bend(view, side * outside, g);
   vec3 d = -view;
   vec3 r = normalize(2.0 * dot(n, view) * n - view);
@@ -421,8 +446,6 @@ void main() {
   float cosine = min(dot(d, g), -0.1);
   vec3 pd[2];
   vec3 rd[2];
-  float e11 = dot(px, px), e12 = dot(px, py), e22 = dot(py, py);
-  float determinant = e11 * e22 - e12 * e12;
   for (int i = 0; i < 2; ++i) {
     vec3 step = i == 0 ? uRight : uDown;
     vec3 change = (step - dot(step, d) * d) / slope;
@@ -433,9 +456,9 @@ void main() {
     if ((!uFlat || uTextured.z) && determinant > 0.0) {
       float p1 = dot(p, px), p2 = dot(p, py);
       float a = (p1 * e22 - p2 * e12) / determinant, b = (p2 * e11 - p1 * e12) / determinant;
-      vec3 moved = vNormal + a * nx + b * ny;
+      vec3 moved = normal + a * nx + b * ny;
       vec3 dn = uTextured.z
-        ? frontNormal(moved, front, vUv + a * ux + b * uy, px, py, ux, uy) - outside
+        ? frontNormal(moved, front, uv + a * ux + b * uy, px, py, ux, uy) - outside
         : (a * nx + b * ny) / normalLength;
       dNormal = side * (dn - dot(dn, n) * n);
     }
@@ -445,22 +468,22 @@ void main() {
 
   vec3 light = vec3(0.0);
   if (uCaptured) {
-    light = readShell(SHELLS, vPosition, r, pd[0], rd[0], pd[1], rd[1]).rgb;
+    light = readShell(SHELLS, position, r, pd[0], rd[0], pd[1], rd[1]).rgb;
   } else {
     float through = 1.0;
     for (int shell = 0; shell < SHELLS; ++shell) {
       if (uShellOn[shell] == 0.0) continue;
-      vec4 layer = readShell(shell, vPosition, r, pd[0], rd[0], pd[1], rd[1]);
+      vec4 layer = readShell(shell, position, r, pd[0], rd[0], pd[1], rd[1]);
       light += through * layer.rgb;
       through *= 1.0 - layer.a;
     }
   }
   vec3 r0 = uR0 * (uColorsTint ? vColor : vec3(1.0));
-  if (uTextured.y) r0 *= texture(uReflectanceTexture, uReflectanceFromUv * vec3(vUv, 1.0)).rgb;
+  if (uTextured.y) r0 *= texture(uReflectanceTexture, uReflectanceFromUv * vec3(uv, 1.0)).rgb;
   vec3 f = fresnel(dot(n, view), r0);
   vec3 albedo = uAlbedo * vColor;
-  if (uTextured.x) albedo *= texture(uAlbedoTexture, uAlbedoFromUv * vec3(vUv, 1.0)).rgb;
-  vec3 body = uDiffuseOn * albedo * (vIrradiance * 0.3183098861837907) * (uCoated ? 1.0 - f : vec3(1.0));
+  if (uTextured.x) albedo *= texture(uAlbedoTexture, uAlbedoFromUv * vec3(uv, 1.0)).rgb;
+  vec3 body = uDiffuseOn * albedo * (irradiance * 0.3183098861837907) * (uCoated ? 1.0 - f : vec3(1.0));
   oColour = vec4(min(light * f + body, 65000.0), 1.0);
 }
 `;

@@ -19,8 +19,8 @@
 namespace mirrorbake {
 namespace {
 
-// Lobes that need smaller nodes than this are summed texel by texel.
-constexpr double kNarrow = 2.0 / (1.3 * 256.0);
+// Lobes that need smaller nodes than this, in radians, are summed texel by texel: Phong from N = 5,625.
+constexpr double kNarrow = 0.008;
 // Steps of the table of weights of narrow lobes, by (1 − cos γ)/2: 3e-6 of a weight between them.
 constexpr std::size_t kNarrowSteps = 4096;
 

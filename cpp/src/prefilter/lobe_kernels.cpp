@@ -98,13 +98,20 @@ void accumulate_with(const MomentNode* nodes, const std::uint32_t* list, std::si
         float h = 0.25F * (dx * dx + dy * dy + dz * dz);
         h = h < 1.0F ? h : 1.0F;
         const Weights w = kernel(h);
-        // The mean of (r·(l − l₀))² over a node that looks alike from all sides: half of what lies across.
-        const float second = w.second * h * (1.0F - h);
+        const float u = dx * node.tangent[0][0] + dy * node.tangent[0][1] + dz * node.tangent[0][2];
+        const float v = dx * node.tangent[1][0] + dy * node.tangent[1][1] + dz * node.tangent[1][2];
+        // The sphere falls away from its tangents by (u² + v²)/2, along l₀.
+        const float fall = w.first * (1.0F - 2.0F * h);
+        const float along_u = w.second * u;
+        const float uu = along_u * u - fall;
+        const float vv = w.second * v * v - fall;
+        const float uv = 2.0F * along_u * v;
+        const float first_u = w.first * u;
+        const float first_v = w.first * v;
         for (std::size_t c = 0; c < 4; ++c) {
           part[c][k] +=
-              w.value * node.light[c] +
-              w.first * (x[k] * node.shift[0][c] + y[k] * node.shift[1][c] + z[k] * node.shift[2][c]) +
-              second * node.spread[c];
+              (w.value * node.light[c] + (first_u * node.shift[0][c] + first_v * node.shift[1][c])) +
+              (uu * node.spread[0][c] + vv * node.spread[1][c] + uv * node.spread[2][c]);
         }
       }
     }

@@ -6,15 +6,16 @@
 /// The inner loops of convolution, one set per instruction set (mirrorbake_add_isa_sources).
 namespace mirrorbake {
 
-/// Light of a part of the sphere, in up to three channels, and in the fourth the solid angle itself: Σ w L
-/// over its texels, Σ w L (l − l₀) and Σ w L |l − l₀|², l₀ the unit vector to where most of the light comes
-/// from.
+/// Light of a part of the sphere, in up to three channels, and in the fourth the solid angle itself, by its
+/// moments up to the second about l₀, the unit vector to where most of the light comes from. With u and v
+/// what lies of l − l₀ along the two tangents: Σ w L, Σ w L (u, v), and half of Σ w L (u², v², uv).
 struct MomentNode {
   float direction[3];
   float bound;  ///< how far its texels may be from `direction`, as a chord; below 0: it has none
+  float tangent[2][3];
   float light[4];
-  float shift[3][4];
-  float spread[4];
+  float shift[2][4];
+  float spread[3][4];
 };
 
 constexpr std::size_t kOutputs = 16;  ///< directions that are worked on together

@@ -9,11 +9,17 @@
 namespace mirrorbake {
 namespace {
 
-// Nodes as wide as this share of the scale on which the lobe changes: with both moments that they carry, what
-// is left out is of the fourth order for light that is spread evenly, and 1e-4 of the peak at most for a sun.
-constexpr double kShare = 0.35;
-constexpr double kPhongShare = 0.45;  // whose derivatives fall off as fast as the lobe
-constexpr double kWidest = 0.2;       // radians, of lobes that are as wide as a hemisphere
+// Nodes as wide as this share of the scale on which the lobe changes: with the moments that they carry, what
+// is left out is of the third order, and cancels where light is spread evenly.
+constexpr double kShare = 0.5;
+constexpr double kPhongShare = 0.6;  // whose derivatives fall off as fast as the lobe
+constexpr double kWidest = 0.2;      // radians, of lobes that are as wide as a hemisphere
+// Nodes that may be all that a lobe sees are as much narrower, for an error that is this to the third
+// smaller.
+constexpr double kBright = 2.5;
+// Where a lobe has a corner, nodes that lie across it.
+constexpr float kAtHorizon = 0.055F;
+constexpr float kBrightAtHorizon = 0.004F;
 // Weights are left out below this share of the lobe's integral: a sun of 1e5 times the surroundings, 6e-5 sr
 // wide, adds less than 3e-5 of what they add.
 constexpr double kNegligible = 4e-6;
@@ -25,6 +31,14 @@ double phong_cut(double exponent) {
   const double weight = kNegligible * 2.0 * std::numbers::pi / (exponent + 1.0);
   const double cosine = std::pow(weight, 1.0 / exponent);
   return std::sqrt(2.0 * (1.0 - cosine));
+}
+
+// How much wider nodes may be at so many σ from the axis, where Phong's weight is about exp(−σ²/2): what is
+// left out of it is that times σ³ and the width to the third, and no more than next to the axis.
+double phong_growth(double sigmas) {
+  if (sigmas < 2.0) return 1.0;
+  const double left = std::exp(-0.5 * sigmas * sigmas) * sigmas * sigmas * sigmas;
+  return std::clamp(std::cbrt(1.1 / left), 1.0, 4.0);
 }
 
 void plan_table(const Lobe& lobe, LobePlan& plan) {
@@ -70,6 +84,7 @@ void plan_table(const Lobe& lobe, LobePlan& plan) {
       least = std::min(least, scale[k]);
     }
     plan.allowed[i] = static_cast<float>(std::min(kWidest, kShare * least));
+    plan.allowed_bright[i] = plan.allowed[i] / static_cast<float>(kBright);
   }
 }
 
@@ -80,6 +95,7 @@ double LobePlan::finest() const {
   for (std::size_t i = 0; i <= kSteps && 2.0 * static_cast<double>(i) / kSteps <= cut; ++i) {
     least = std::min(least, allowed[i]);
   }
+  if (cut >= std::numbers::sqrt2) least = std::min(least, at_horizon);
   return static_cast<double>(least);
 }
 
@@ -88,15 +104,24 @@ void make_plan(const Lobe& lobe, LobePlan& plan) {
   switch (lobe.kind) {
     case LobeKind::lambert:
       plan.cut = std::numbers::sqrt2;
-      plan.has_horizon = true;
+      plan.at_horizon = kAtHorizon;
+      plan.bright_at_horizon = kBrightAtHorizon;
       plan.allowed.fill(static_cast<float>(kWidest));
       plan.terms = {LobeForm::phong, 1.0F};
       return;
     case LobeKind::phong:
       plan.width = 1.0 / std::sqrt(lobe.exponent);
       plan.cut = phong_cut(lobe.exponent);
-      plan.has_horizon = lobe.exponent < 6.0;
-      plan.allowed.fill(static_cast<float>(std::min(kWidest, kPhongShare * plan.width)));
+      if (lobe.exponent < 6.0) {
+        plan.at_horizon = kAtHorizon;
+        plan.bright_at_horizon = kBrightAtHorizon;
+      }
+      for (std::size_t i = 0; i <= LobePlan::kSteps; ++i) {
+        const double sigmas = angle_of(2.0 * static_cast<double>(i) / LobePlan::kSteps) / plan.width;
+        plan.allowed[i] =
+            static_cast<float>(std::min(kWidest, kPhongShare * plan.width * phong_growth(sigmas)));
+        plan.allowed_bright[i] = static_cast<float>(std::min(kWidest, kPhongShare * plan.width) / kBright);
+      }
       plan.terms = {LobeForm::phong, static_cast<float>(lobe.exponent)};
       return;
     case LobeKind::ggx: {
@@ -104,11 +129,13 @@ void make_plan(const Lobe& lobe, LobePlan& plan) {
       const double core = 2.0 * lobe.alpha;
       plan.width = core / 1.5;
       plan.cut = std::numbers::sqrt2;
-      plan.has_horizon = lobe.alpha > 0.15;
+      if (lobe.alpha > 0.15) plan.at_horizon = kAtHorizon;
+      plan.bright_at_horizon = kBrightAtHorizon;
       for (std::size_t i = 0; i <= LobePlan::kSteps; ++i) {
         const double angle = angle_of(2.0 * static_cast<double>(i) / LobePlan::kSteps);
         plan.allowed[i] =
             static_cast<float>(std::min(kWidest, 0.5 * kShare * std::sqrt(core * core + angle * angle)));
+        plan.allowed_bright[i] = plan.allowed[i] / static_cast<float>(kBright);
       }
       plan.terms = {LobeForm::ggx, 1.0F, static_cast<float>(lobe.alpha * lobe.alpha)};
       return;

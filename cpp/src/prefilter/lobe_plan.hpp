@@ -13,20 +13,25 @@ namespace mirrorbake {
 struct LobePlan {
   static constexpr std::size_t kSteps = 512;  ///< of the chord from 0 to 2
 
-  double width = 1.0;                          ///< σ of the Gaussian that the peak looks like, in radians
-  double cut = 2.0;                            ///< chord beyond which weights count for nothing
-  bool has_horizon = false;                    ///< the weight has a corner at cos γ = 0 that can be seen
-  std::array<float, kSteps + 1> allowed = {};  ///< widest node, in radians, no closer than the chord
+  double width = 1.0;  ///< σ of the Gaussian that the peak looks like, in radians
+  double cut = 2.0;    ///< chord beyond which weights count for nothing
+  // Widest nodes, in radians: no closer than the chord, and where the weight has a corner at cos γ = 0.
+  std::array<float, kSteps + 1> allowed = {};
+  std::array<float, kSteps + 1> allowed_bright = {};  ///< of nodes that are brighter than most
+  float at_horizon = 1.0F;
+  float bright_at_horizon = 1.0F;
   std::vector<float> table = {};
   LobeTerms terms = {};
 
-  float allowed_at(float chord) const {
+  float allowed_at(float chord) const { return allowed[step_of(chord)]; }
+  float allowed_bright_at(float chord) const { return allowed_bright[step_of(chord)]; }
+  static std::size_t step_of(float chord) {
     const float position = chord * (0.5F * kSteps);
-    return allowed[position > 0.0F
-                       ? (position < static_cast<float>(kSteps) ? static_cast<std::size_t>(position) : kSteps)
-                       : std::size_t{0}];
+    return position > 0.0F
+               ? (position < static_cast<float>(kSteps) ? static_cast<std::size_t>(position) : kSteps)
+               : std::size_t{0};
   }
-  double finest() const;
+  double finest() const;  ///< of all but the bright ones
 };
 
 /// `plan.terms.table` points into `plan.table`: the plan must not be copied.

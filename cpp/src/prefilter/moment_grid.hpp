@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -9,7 +10,9 @@
 #include "mirrorbake/envmap/envmap.hpp"
 #include "source_texels.hpp"
 
-/// The light of a map in the cells of a cube, and in cells of twice, four times … their width.
+/// The light of a map in the cells of a cube, and in cells of twice, four times … their width. Cells that are
+/// bright beside the rest, by more than a point, are there in halves and quarters, too: their light is all
+/// that a lobe shows at many times its width from them, and at its horizon.
 namespace mirrorbake {
 
 class MomentGrid {
@@ -23,7 +26,7 @@ class MomentGrid {
   const MomentNode* nodes() const { return nodes_.data(); }
 
   /// Appends the nodes to look at for all directions within a chord `radius` of `center`, none of cells
-  /// smaller than those of a grid of `cells`.
+  /// smaller than those that a grid of `cells` has.
   void find(const LobePlan& plan, int cells, const float* center, float radius,
             std::vector<std::uint32_t>& list) const;
 
@@ -31,20 +34,28 @@ class MomentGrid {
   static int cells_for(double node_width);
 
  private:
-  // What decides whether four cells that share a parent are looked at, read together.
+  static constexpr std::uint32_t kNoChild = 0xffffffffU;
+  // What decides whether four cells that share a parent are looked at, read together. Number q is of nodes
+  // 4 q … 4 q + 3.
   struct Quad {
     float direction[3][4];
     float bound[4];
-    float width[4];  ///< in radians
+    float width[4];          ///< in radians
+    std::uint32_t child[4];  ///< number of the quad of its parts
+    bool bright[4];
   };
-  void fill_quads(const std::vector<std::vector<float>>& widths);
 
-  // Cells of a level lie face by face and in each along a Z, so that those of cell i are 4 i … 4 i + 3.
+  void put(std::size_t at, const MomentNode& node, float width);
+  void find_bright();
+  bool is_bright(std::size_t at) const;
+  void cut_bright(const EnvMapView& map, int first_channel, const SourceTexels& texels);
+
   int cells_;
   int levels_;
   std::vector<std::size_t> offsets_;  ///< of the levels, the finest first
-  std::vector<MomentNode> nodes_;
-  std::vector<Quad> quads_;  ///< of every four nodes, without the coarsest level
+  std::vector<MomentNode> nodes_;     ///< of the levels, and after them the parts of bright cells
+  std::vector<Quad> quads_;
+  std::array<float, 3> bright_{};  ///< radiance above which a channel counts as bright
 };
 
 }  // namespace mirrorbake

@@ -11,7 +11,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-PROGRAMS = ("mb-envmap", "mb-fresnel", "mb-trace")
+PROGRAMS = ("mb-envmap", "mb-fresnel", "mb-infer", "mb-trace")
 
 
 def main(wheel: Path) -> None:

@@ -1,13 +1,17 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "bind.hpp"
+#include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/inference/display_fit.hpp"
+#include "mirrorbake/inference/layer_images.hpp"
 #include "signature.hpp"
 
 namespace mirrorbake::bindings {
@@ -144,12 +148,61 @@ radiance and alpha, those of a node stacked in the order of `maps`; and reports 
 then of each pass.)");
 }
 
+void bind_layer_inference(nb::module_& m) {
+  nb::class_<LayerInference> inference(m, "LayerInference", "Maps that were inferred from images of layers.");
+  inference
+      .def_prop_ro(
+          "maps",
+          [](LayerInference& self) {
+            nb::dict maps;
+            for (InferredMap& map : self.maps) {
+              const std::size_t channels = map.has_alpha ? 4 : 3;
+              std::vector<float> texels = map.texels;
+              const std::size_t count = texels.size() / channels;
+              maps[map.name.c_str()] = to_numpy(std::move(texels), {count, channels});
+            }
+            return maps;
+          },
+          nb::sig("def maps(self) -> dict[str, NDArray[numpy.float32]]"),
+          "By name, float32 (texels, 3), or (texels, 4), premultiplied, with alpha. A new copy every time.")
+      .def_ro("report", &LayerInference::report, "Of the solver's last pass.")
+      .def_ro("pixels", &LayerInference::pixels, "To which the maps were fitted.")
+      .def_ro("rejected", &LayerInference::rejected, "Pixels left out, since their light is not finite.");
+  show(inference, {"pixels", "rejected", "report"});
+  m.def(
+      "infer_from_layers",
+      [](const std::vector<PathText>& paths, const std::vector<std::pair<std::string, Proxy>>& shells,
+         const TexelTopology& map, const RunTimeModel& run_time, bool maps_per_part,
+         const std::string& reflector, const DisplayFitOptions& fit) {
+        LayerInferenceOptions options;
+        for (const auto& [name, proxy] : shells) options.shells.push_back({name, proxy});
+        options.map = map;
+        options.run_time = run_time;
+        options.sharing = maps_per_part ? MapSharing::per_part : MapSharing::all_parts;
+        options.reflector = reflector;
+        options.fit = fit;
+        const nb::gil_scoped_release unlocked;
+        std::vector<LayerImage> images;
+        for (const PathText& path : paths) images.push_back({path.text, load_image(path.text)});
+        return infer_from_layers(images, options);
+      },
+      nb::arg("paths"), nb::kw_only(), nb::arg("shells") = std::vector<std::pair<std::string, Proxy>>{},
+      nb::arg("map") = TexelTopology::cube(128), nb::arg("run_time") = web_run_time(),
+      nb::arg("maps_per_part") = false, nb::arg("reflector") = "", nb::arg("options") = DisplayFitOptions{},
+      signature<R"(def infer_from_layers(paths: collections.abc.Sequence[str | os.PathLike[str]], *,
+shells: collections.abc.Sequence[tuple[str, Proxy]] = (), map: TexelTopology = ...,
+run_time: RunTimeModel = ..., maps_per_part: bool = False, reflector: str = '',
+options: DisplayFitOptions = ...) -> LayerInference)">(),
+      "Infers maps from the images of layers that mb-trace writes. Use `mirrorbake.inference.infer_maps`.");
+}
+
 }  // namespace
 
 void bind_display_fit(nb::module_& m) {
   bind_targets(m);
   bind_fit_inputs(m);
   bind_fit(m);
+  bind_layer_inference(m);
 }
 
 }  // namespace mirrorbake::bindings

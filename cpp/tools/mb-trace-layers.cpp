@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/surface/lookup_image.hpp"
+#include "mirrorbake/surface/run_time_model.hpp"
 #include "trace_command.hpp"
 
 namespace mirrorbake::tool {
@@ -22,11 +24,18 @@ class Layers final : public Command {
         "--reflector", reflectors_,
         "name of an object, may be given several times (default: all specular objects in view); with "
         "several the channels start with the name");
+    app->add_option(
+        "--lookups", run_time_,
+        "write as well where the lookups of this run time meet the reflectors, for mb-infer: Web, "
+        "Web1 or Reference; the pixels are then float32");
   }
 
   void run(bool json) const override {
     const Stopwatch watch;
-    check_image_path(request_.output, parse_pixel_format(request_.format));
+    PixelFormat format = parse_pixel_format(request_.format);
+    if (!run_time_.empty() && format == PixelFormat::automatic) format = PixelFormat::float32;
+    check_image_path(request_.output, format);
+    const RunTimeModel run_time = run_time_.empty() ? RunTimeModel{} : run_time_model(run_time_);
     const TraceOptions options = request_.trace_options();
     Source source = request_.load();
     const Camera camera = request_.camera(source);
@@ -55,7 +64,14 @@ class Layers final : public Command {
       const std::string& name = tracer.scene().objects[static_cast<std::size_t>(numbers[i])].name;
       parts.emplace_back(layers.size() == 1 ? "" : name + ".", &layers[i]);
     }
-    request_.save(merge(parts));
+    std::vector<Image> lookups;
+    lookups.reserve(layers.size());  // of which parts keep addresses
+    for (std::size_t i = 0; i < layers.size() && !run_time_.empty(); ++i) {
+      const SurfaceSamples met = tracer.trace_visibility(camera, numbers[i], options, run_time.places);
+      lookups.push_back(lookup_image(met, static_cast<int>(run_time.places.size())));
+      parts.emplace_back(parts[i + 1].first, &lookups.back());
+    }
+    request_.warn(save_image(request_.output, merge(parts), format));
     if (!json) return;
     std::cout << "{\"output\": " << json_string(request_.output) << ", \"width\": " << beauty.width
               << ", \"height\": " << beauty.height << ", \"samples_per_pixel\": " << options.samples_per_pixel
@@ -102,6 +118,7 @@ class Layers final : public Command {
 
   Request request_;
   std::vector<std::string> reflectors_;
+  std::string run_time_;
 };
 
 }  // namespace

@@ -57,9 +57,6 @@ struct Request {
   void warn(const SaveReport& report) const { warn_of_losses("mb-trace", output, report); }
 };
 
-/// The channels of several images of one size side by side, each image's with a prefix.
-Image merge(const std::vector<std::pair<std::string, const Image*>>& images);
-
 class Stopwatch {
  public:
   double seconds() const {

@@ -1884,6 +1884,34 @@ def fit_display(views: Sequence[DisplayView], parts: Sequence[Sequence[FitShell]
     then of each pass.
     """
 
+class LayerInference:
+    """Maps that were inferred from images of layers."""
+
+    @property
+    def maps(self) -> dict[str, NDArray[numpy.float32]]:
+        """
+        By name, float32 (texels, 3), or (texels, 4), premultiplied, with alpha. A new copy every time.
+        """
+
+    @property
+    def report(self) -> SolveReport:
+        """Of the solver's last pass."""
+
+    @property
+    def pixels(self) -> int:
+        """To which the maps were fitted."""
+
+    @property
+    def rejected(self) -> int:
+        """Pixels left out, since their light is not finite."""
+
+    def __repr__(self) -> str: ...
+
+def infer_from_layers(paths: Sequence[str | os.PathLike[str]], *, shells: Sequence[tuple[str, Proxy]] = (), map: TexelTopology = ..., run_time: RunTimeModel = ..., maps_per_part: bool = False, reflector: str = '', options: DisplayFitOptions = ...) -> LayerInference:
+    """
+    Infers maps from the images of layers that mb-trace writes. Use `mirrorbake.inference.infer_maps`.
+    """
+
 class ShellMap:
     """The map of one shell, as a part of the reflector reads it."""
 

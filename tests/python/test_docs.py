@@ -53,7 +53,7 @@ QUICK = {"--spp": "16", "--size": "16x12"}
 """Of mb-trace, instead of what an example says: the same options, in less time."""
 
 SCRIPTS = [str(path.relative_to(ROOT)) for path in (ROOT / "script").iterdir()] + [".ci/run"]
-TOOLS = ["mb-envmap", "mb-fresnel", "mb-trace"]
+TOOLS = ["mb-envmap", "mb-fresnel", "mb-infer", "mb-trace"]
 BUILDERS = ["cmake", "ctest", ".venv/bin/python"]
 FUZZERS = [
     f"build/fuzz/tests/fuzz/{name}"

@@ -10,12 +10,29 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from mirrorbake import _core
 from mirrorbake.commands.main import app
 from mirrorbake.envmap import EnvMap
 from programs import find_program
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 TOML = '[reflector]\nobject = "teapot"\n'
+
+# Of a view with four lookups a pixel.
+LAYERS = [
+    "coverage",
+    *(f"{layer}.{c}" for layer in ("fresnel", "specular_local", "specular_distant") for c in "RGB"),
+    "specular_local.A",
+    *(f"lookup.{n}.part" for n in range(4)),
+    *(f"lookup.{n}.fresnel.{c}" for n in range(4) for c in "RGB"),
+    *(
+        f"lookup.{n}.{name}{change}.{axis}"
+        for n in range(4)
+        for name in ("position", "reflection")
+        for change in ("", "_dx", "_dy")
+        for axis in "XYZ"
+    ),
+]
 
 # A command that would succeed, and options of it with values that they do not take.
 COMMANDS = {
@@ -49,7 +66,29 @@ COMMANDS = {
             "--size 4x",
             "--fov 180",
         ),
-        *("--depth 65", "--indirect some", "--format half2"),
+        *("--depth 65", "--indirect some", "--format half2", "--lookups Fast"),
+    ],
+    "mb-infer LAYERS.exr -o OUT.exr --size 4": [
+        *(
+            "--size 3",
+            "--size 0",
+            "--size many",
+            "--to latlong",
+            "--run-time Fast",
+            "--passes 0",
+            "--passes 17",
+        ),
+        *("--shell near=infinite", "--shell distant", "--shell distant=cube", "--shell distant=sphere:0,0,0"),
+        *("--shell distant=sphere:0,0,0,-1", "--shell distant=box:0,0,0,1,1,nan", "--shell local=infinite"),
+        *("--shell distant=box:0,0,0,1,1,1@9,9,9", "--smoothness -1", "--level-agreement nan"),
+        *(
+            "--reflector lake",
+            "--layer-weight -1",
+            "--tolerance 0",
+            "--iterations -1",
+            "--format half2",
+            "--threads -1",
+        ),
     ],
     "mb-trace capture SCENE -o OUT.exr --size 4 --spp 1": [
         *(
@@ -157,6 +196,14 @@ FILES = [
     ),
     *("mb-trace capture NONE.obj -o OUT.exr", "mb-trace capture SCENE -o OUT.doc"),
     *(
+        "mb-infer NONE.exr -o OUT.exr",
+        "mb-infer JUNK.exr -o OUT.exr",
+        "mb-infer MAP.exr -o OUT.exr",
+        "mb-infer LAYERS.exr -o OUT.exr --run-time Web1",
+        "mb-infer LAYERS.exr -o OUT.png",
+        "mb-infer LAYERS.exr -o NONE/OUT.exr",
+    ),
+    *(
         "mb-envmap info NONE.exr",
         "mb-envmap info JUNK.exr",
         "mb-envmap info NONE.ktx2",
@@ -197,6 +244,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     EnvMap.from_array(values[..., :2], "latlong").save(made / "TWO.exr")
     EnvMap.from_array(np.full_like(values, np.nan), "latlong").save(made / "NAN.exr")
     EnvMap.from_array(values[:, :11], "latlong").save(made / "ODD.exr")
+    nothing = [-1.0 if name.endswith("part") else 0.0 for name in LAYERS]
+    _core.save_image(made / "LAYERS.exr", np.full((8, 8, len(LAYERS)), nothing, np.float32), LAYERS)
     return made
 
 
@@ -248,7 +297,7 @@ def test_a_file_that_cannot_be_used_is_exit_3(command: str, folder: Path) -> Non
     assert_fails(command, folder, 3)
 
 
-@pytest.mark.parametrize("program", ["mb-trace", "mb-envmap", "mb-fresnel", "mirrorbake"])
+@pytest.mark.parametrize("program", ["mb-trace", "mb-envmap", "mb-fresnel", "mb-infer", "mirrorbake"])
 @pytest.mark.parametrize("words", ["fly", "--fly"])
 def test_an_unknown_command_is_exit_2(program: str, words: str, folder: Path) -> None:
     assert_fails(f"{program} {words}", folder, 2)

@@ -27,6 +27,7 @@ COMMANDS = [
             "compare",
         )
     ),
+    "mb-infer",
     *(f"mb-fresnel {command}" for command in ("table", "plot", "metal", "report")),
     *(
         f"mirrorbake {command}"

@@ -92,4 +92,21 @@ Image colours_of(const std::string& name, Image image) {
   throw FileError(name, "has the channels " + channels + ", expected colours: R, G and B, or Y");
 }
 
+Image merge(const std::vector<std::pair<std::string, const Image*>>& images) {
+  std::vector<std::string> names;
+  for (const auto& [prefix, image] : images) {
+    for (const std::string& channel : image->channels) names.push_back(prefix + channel);
+  }
+  Image merged(images.front().second->width, images.front().second->height, names);
+  for (int y = 0; y < merged.height; ++y) {
+    for (int x = 0; x < merged.width; ++x) {
+      float* out = merged.at(x, y);
+      for (const auto& [prefix, image] : images) {
+        out = std::copy_n(image->at(x, y), image->channels.size(), out);
+      }
+    }
+  }
+  return merged;
+}
+
 }  // namespace mirrorbake

@@ -24,4 +24,8 @@ void check_exr(const std::string& name, const Bytes& bytes);
 std::uint64_t write_exr(const std::string& path, const std::string& file, int width, int height,
                         std::span<const std::string> channels, std::span<const float> pixels, bool as_half);
 
+/// The same for all levels of an image, in tiles of 64².
+std::uint64_t write_exr_levels(const std::string& path, const std::string& file,
+                               std::span<const Image> levels, bool as_half);
+
 }  // namespace mirrorbake::image_files

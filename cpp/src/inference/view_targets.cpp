@@ -51,11 +51,64 @@ ViewTargets::ViewTargets(int width, int height, int parts, int shells, const Sta
   own_shell_ = own_shells(stacks, parts, shells);
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   traced_.resize(pixels);
-  counts_.resize(pixels * static_cast<std::size_t>(parts));
+  first_.resize(pixels, kNone);
   reflected_.resize(pixels);
   diffuse_.resize(pixels);
-  radiance_.resize(counts_.size() * static_cast<std::size_t>(shells));
-  light_from_.resize(radiance_.size());
+}
+
+std::uint32_t ViewTargets::find(std::size_t pixel, int part) const {
+  std::uint32_t entry = first_[pixel];
+  while (entry != kNone && entries_[entry].part != part) entry = entries_[entry].next;
+  return entry;
+}
+
+std::uint32_t ViewTargets::find_or_add(std::size_t pixel, int part) {
+  const std::uint32_t known = find(pixel, part);
+  if (known != kNone) return known;
+  const auto entry = static_cast<std::uint32_t>(entries_.size());
+  entries_.push_back({first_[pixel], 0, part});
+  first_[pixel] = entry;
+  radiance_.resize(radiance_.size() + static_cast<std::size_t>(shells_), glm::dvec4(0.0));
+  light_from_.resize(radiance_.size(), glm::dvec3(0.0));
+  return entry;
+}
+
+void ViewTargets::add_shells(std::uint32_t entry, std::span<const glm::vec4> layers, std::uint32_t count) {
+  const int* own =
+      own_shell_.data() + static_cast<std::size_t>(entries_[entry].part) * static_cast<std::size_t>(shells_);
+  glm::vec3 behind(0.0F);
+  glm::vec4 stacked(0.0F);
+  for (int k = shells_ - 1; k >= 0; --k) {
+    const glm::vec4 layer = layers[static_cast<std::size_t>(k)];
+    behind = glm::vec3(layer) + (1.0F - layer.a) * behind;
+    const bool is_last = k == shells_ - 1 || own[k + 1] != own[k];
+    stacked = is_last ? layer : layer + (1.0F - layer.a) * stacked;
+    if (k > 0 && own[k - 1] == own[k]) continue;
+    radiance_[at(entry, own[k])] += static_cast<double>(count) * glm::dvec4(stacked);
+    light_from_[at(entry, own[k])] += static_cast<double>(count) * glm::dvec3(behind);
+  }
+}
+
+void ViewTargets::add_means(std::size_t pixel, const PixelMeans& means) {
+  check_range("pixel", pixel, std::size_t{0}, first_.size() - 1);
+  check_range("part", means.part, 0, parts_ - 1);
+  check_above("coverage", static_cast<double>(means.coverage), 0.0, 1.0);
+  check_length("shells", means.shells.size(), static_cast<std::size_t>(shells_), "those of the targets");
+  bool finite = is_finite(means.reflected) && is_finite(means.diffuse);
+  for (const glm::vec4& shell : means.shells) {
+    finite = finite && is_finite(glm::vec3(shell)) && std::isfinite(shell.a);
+  }
+  if (!finite) {
+    ++rejected_;
+    return;
+  }
+  const auto count = std::max(static_cast<std::uint32_t>(means.coverage * kWhole + 0.5F), 1U);
+  const std::uint32_t entry = find_or_add(pixel, means.part);
+  entries_[entry].count += count;
+  traced_[pixel] += kWhole;
+  reflected_[pixel] += static_cast<double>(count) * glm::dvec3(means.reflected);
+  diffuse_[pixel] += static_cast<double>(count) * glm::dvec3(means.diffuse);
+  add_shells(entry, means.shells, count);
 }
 
 void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
@@ -69,6 +122,7 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
   check_length("samples.shells", samples.shells.size(), static_cast<std::size_t>(shells_),
                "those of the targets");
   check_length("samples.diffuse", samples.diffuse.size(), n, "as many as samples.pixel");
+  std::vector<glm::vec4> layers(static_cast<std::size_t>(shells_));
   for (std::size_t i = 0; i < n; ++i) {
     check_range("samples.part", static_cast<int>(samples.part[i]), 0, parts_ - 1);
     const glm::vec3 light = samples.fresnel[i] * incident_light(samples.shells, i);
@@ -83,21 +137,12 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
       ++rejected_;
       continue;
     }
-    ++counts_[at(pixel, samples.part[i])];
+    const std::uint32_t entry = find_or_add(pixel, samples.part[i]);
+    ++entries_[entry].count;
     reflected_[pixel] += glm::dvec3(light);
     diffuse_[pixel] += glm::dvec3(samples.diffuse[i]);
-    const int* own = own_shell_.data() + std::size_t{samples.part[i]} * static_cast<std::size_t>(shells_);
-    glm::vec3 behind(0.0F);
-    glm::vec4 stacked(0.0F);
-    for (int k = shells_ - 1; k >= 0; --k) {
-      const glm::vec4 layer = samples.shells[static_cast<std::size_t>(k)].radiance[i];
-      behind = glm::vec3(layer) + (1.0F - layer.a) * behind;
-      const bool is_last = k == shells_ - 1 || own[k + 1] != own[k];
-      stacked = is_last ? layer : layer + (1.0F - layer.a) * stacked;
-      if (k > 0 && own[k - 1] == own[k]) continue;
-      radiance_[at(pixel, samples.part[i], own[k])] += glm::dvec4(stacked);
-      light_from_[at(pixel, samples.part[i], own[k])] += glm::dvec3(behind);
-    }
+    for (std::size_t k = 0; k < layers.size(); ++k) layers[k] = samples.shells[k].radiance[i];
+    add_shells(entry, layers, 1);
   }
   for (int row = 0; row < samples.height; ++row) {
     for (int column = 0; column < samples.width; ++column) {
@@ -113,7 +158,7 @@ void ViewTargets::add(const SurfaceSamples& samples, int x, int y) {
 
 std::uint32_t ViewTargets::count(std::size_t pixel) const {
   std::uint32_t sum = 0;
-  for (int part = 0; part < parts_; ++part) sum += count(pixel, part);
+  for (std::uint32_t e = first_[pixel]; e != kNone; e = entries_[e].next) sum += entries_[e].count;
   return sum;
 }
 
@@ -126,12 +171,15 @@ glm::vec3 ViewTargets::diffuse(std::size_t pixel) const {
 }
 
 glm::vec4 ViewTargets::shell(std::size_t pixel, int part, int shell) const {
-  return glm::vec4(radiance_[at(pixel, part, shell)] / static_cast<double>(std::max(count(pixel, part), 1U)));
+  const std::uint32_t entry = find(pixel, part);
+  if (entry == kNone) return glm::vec4(0.0F);
+  return glm::vec4(radiance_[at(entry, shell)] / static_cast<double>(std::max(entries_[entry].count, 1U)));
 }
 
 glm::vec3 ViewTargets::light_from(std::size_t pixel, int part, int shell) const {
-  return glm::vec3(light_from_[at(pixel, part, shell)] /
-                   static_cast<double>(std::max(count(pixel, part), 1U)));
+  const std::uint32_t entry = find(pixel, part);
+  if (entry == kNone) return glm::vec3(0.0F);
+  return glm::vec3(light_from_[at(entry, shell)] / static_cast<double>(std::max(entries_[entry].count, 1U)));
 }
 
 }  // namespace mirrorbake

@@ -49,8 +49,8 @@ class ViewTracer:
         self._parts, self._shells, self._stacks = len(header.parts), len(header.rules), header.stacks
         self._places = model_of(header.run_time).places
         width, height = stage.built.cameras.size
-        # Sums per pixel, part and shell, and lookups over a third of the frame.
-        size = width * height * (48 + self._parts * (4 + 56 * self._shells) + 60 * len(self._places))
+        # Sums per pixel; per shell and lookup over a third of the frame, some pixels seeing two parts.
+        size = width * height * (56 + (12 + 56 * self._shells) // 2 + 60 * len(self._places))
         self._most = max(KEPT_BYTES // size, 3)
         self._kept: OrderedDict[Point, TracedView] = OrderedDict()
 

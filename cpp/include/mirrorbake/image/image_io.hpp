@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mirrorbake/image/image.hpp"
@@ -55,6 +56,9 @@ Image load_image(const std::string& path, const ImageLimits& limits = {}, const 
 /// there are none, or several layers that have them.
 Image colours_of(const std::string& name, Image image);
 
+/// The channels of several images of one size side by side, each image's with a prefix.
+Image merge(const std::vector<std::pair<std::string, const Image*>>& images);
+
 struct ImageSize {
   int width = 0;   ///< pixels
   int height = 0;  ///< pixels
@@ -103,6 +107,16 @@ SaveReport save_image(const std::string& path, const Image& image,
 /// The same for `pixels` of shape height × width × channels.size().
 SaveReport save_image(const std::string& path, int width, int height, std::span<const std::string> channels,
                       std::span<const float> pixels, PixelFormat format = PixelFormat::automatic);
+
+/// An EXR file that holds mip levels: level 0 and as many further ones as there are images, each half as wide
+/// and high, rounded down but 1 at least. OpenEXR wants levels down to one pixel: what is missing, of which a
+/// cube with its faces one below the other has two, is averaged from the last image. Written as save_image
+/// does. Throws FileError and InvalidArgument as it does, and for images that are no levels of one.
+SaveReport save_levels(const std::string& path, std::vector<Image> levels,
+                       PixelFormat format = PixelFormat::automatic);
+
+/// What save_levels would refuse whatever the images are, as check_image_path does.
+void check_levels_path(const std::string& path, PixelFormat format = PixelFormat::automatic);
 
 /// Lets EXR files be packed on so many threads of OpenEXR's, 0 to 1024; none until it is called. They are one
 /// pool for the whole process and do not survive fork(): a program's choice. Throws InvalidArgument.

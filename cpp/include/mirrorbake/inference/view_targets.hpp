@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -29,6 +30,21 @@ class ViewTargets {
   /// InvalidArgument if they do not fit or have no light.
   void add(const SurfaceSamples& samples, int x = 0, int y = 0);
 
+  /// Means over the samples of a pixel that see the reflector, of which nothing else is known.
+  struct PixelMeans {
+    float coverage = 0.0F;                   ///< share of the pixel's samples that see it, (0, 1]
+    int part = 0;                            ///< to which all of them are counted
+    glm::vec3 reflected{0.0F};               ///< F times the incident light
+    glm::vec3 diffuse{0.0F};                 ///< the body's own light
+    std::span<const glm::vec4> shells = {};  ///< what arrives from each traced shell, premultiplied, and α
+  };
+  /// Adds a pixel of which there are means alone, as in an image of layers. Of a stack's shells that hold
+  /// several traced ones the light is composed from the means, which is not the mean of what is composed, but
+  /// for the last one's. Means that are not finite count as not traced (`rejected`). Throws InvalidArgument.
+  void add_means(std::size_t pixel, const PixelMeans& means);
+  /// A pixel in which nothing sees the reflector.
+  void add_nothing(std::size_t pixel) { traced_[pixel] += kWhole; }
+
   int width() const { return width_; }
   int height() const { return height_; }
   int parts() const { return parts_; }
@@ -40,7 +56,10 @@ class ViewTargets {
   float coverage(std::size_t pixel) const { return share(count(pixel), pixel); }
   float coverage(std::size_t pixel, int part) const { return share(count(pixel, part), pixel); }
   /// Of a pixel that see a part.
-  std::uint32_t count(std::size_t pixel, int part) const { return counts_[at(pixel, part)]; }
+  std::uint32_t count(std::size_t pixel, int part) const {
+    const std::uint32_t entry = find(pixel, part);
+    return entry == kNone ? 0 : entries_[entry].count;
+  }
   std::uint32_t count(std::size_t pixel) const;
   /// Means over the samples that see the reflector: F times the incident light, and the body's own light D.
   glm::vec3 reflected(std::size_t pixel) const;
@@ -51,23 +70,39 @@ class ViewTargets {
   glm::vec3 light_from(std::size_t pixel, int part, int shell) const;
 
  private:
-  std::size_t at(std::size_t pixel, int part, int shell) const {
-    return at(pixel, part) * static_cast<std::size_t>(shells_) + static_cast<std::size_t>(shell);
-  }
-  std::size_t at(std::size_t pixel, int part) const {
-    return pixel * static_cast<std::size_t>(parts_) + static_cast<std::size_t>(part);
+  /// Of pixels known by their means: what stands for all of their samples.
+  static constexpr std::uint32_t kWhole = 1U << 16;
+  static constexpr std::uint32_t kNone = 0xffffffffU;
+
+  /// Sums of a part in a pixel. Few pixels see more than one part: entries are made when they are needed,
+  /// those of a pixel are chained.
+  struct Entry {
+    std::uint32_t next = kNone;
+    std::uint32_t count = 0;
+    int part = 0;
+  };
+
+  /// Number of the entry of a part in a pixel; kNone if it has none.
+  std::uint32_t find(std::size_t pixel, int part) const;
+  std::uint32_t find_or_add(std::size_t pixel, int part);
+  std::size_t at(std::uint32_t entry, int shell) const {
+    return std::size_t{entry} * static_cast<std::size_t>(shells_) + static_cast<std::size_t>(shell);
   }
 
   float share(std::uint32_t count, std::size_t pixel) const {
     return traced_[pixel] == 0 ? 0.0F : static_cast<float>(count) / static_cast<float>(traced_[pixel]);
   }
+  /// Adds to an entry, `count` times, what arrives from the traced shells.
+  void add_shells(std::uint32_t entry, std::span<const glm::vec4> layers, std::uint32_t count);
 
   int width_, height_, parts_, shells_;
   std::size_t rejected_ = 0;
   std::vector<int> own_shell_;         // of parts × traced shells: the number in the part's stack
   std::vector<std::uint32_t> traced_;  // samples of a pixel, those beside the reflector included
-  std::vector<std::uint32_t> counts_;
+  std::vector<std::uint32_t> first_;   // entry of a pixel
   std::vector<glm::dvec3> reflected_, diffuse_;
+  std::vector<Entry> entries_;
+  // Of entries × shells.
   std::vector<glm::dvec4> radiance_;
   std::vector<glm::dvec3> light_from_;
 };

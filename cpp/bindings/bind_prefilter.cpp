@@ -96,18 +96,27 @@ void bind_lobes(nb::module_& m) {
       .def(
           "apply",
           [](OwningConvolver& self, const Lobe& lobe, const std::string& projection, int width, int height,
-             LobeScale scale) {
+             LobeScale scale, const std::function<void(double)>& progress) {
             const PrefilterTarget target{parse_projection(projection), width, height};
+            std::function<void(double)> report;
+            if (progress) {
+              report = [&](double done) {
+                nb::gil_scoped_acquire held;
+                progress(done);
+              };
+            }
             EnvMap map;
             {
               nb::gil_scoped_release released;
-              map = self.convolver.apply(lobe, target, scale);
+              map = self.convolver.apply(lobe, target, scale, report);
             }
             return nb::make_tuple(map.layout, block(std::move(map.values)));
           },
           nb::arg("lobe"), nb::arg("projection"), nb::arg("width"), nb::arg("height"), nb::arg("scale"),
+          nb::arg("progress").none() = nb::none(),
           signature<R"(def apply(self, lobe: Lobe, projection: str, width: int, height: int,
-scale: typing.Literal['mean', 'sum']) -> tuple[EnvMapLayout, NDArray[numpy.float32]])">(),
+scale: typing.Literal['mean', 'sum'], progress: collections.abc.Callable[[float], None] | None = None)
+-> tuple[EnvMapLayout, NDArray[numpy.float32]])">(),
           "Layout and values of the map, by the direction of the lobe's axis.")
       .def(
           "sample",

@@ -82,9 +82,12 @@ inline CLI::Validator exposure_range() {
   return CLI::Validator(
       [](const std::string& text) {
         double stops = 0.0;
-        const bool number = CLI::detail::lexical_cast(text, stops);
-        return number && stops >= -20.0 && stops <= 20.0 ? std::string()
-                                                         : text + " is not within -20 to 20 stops";
+        const char* end = text.data() + text.size();
+        const char* digits = text.data() + (text.starts_with('+') && !text.starts_with("+-") ? 1 : 0);
+        const auto [rest, error] = std::from_chars(digits, end, stops);
+        return error == std::errc() && rest == end && stops >= -20.0 && stops <= 20.0
+                   ? std::string()
+                   : text + " is not within -20 to 20 stops";
       },
       "STOPS in [-20 - 20]");
 }

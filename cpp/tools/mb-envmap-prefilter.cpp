@@ -1,8 +1,11 @@
 // mb-envmap prefilter: maps of the light that a lobe gathers, and light as spherical harmonics.
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -164,7 +167,16 @@ class Prefilter final : public Command {
     validate(lobe);
     const bool sum = scale_ == "sum" || (scale_.empty() && model_ == "irradiance");
     const EnvMap source = load();
-    output_.save(Convolver(source).apply(lobe, target, sum ? LobeScale::sum : LobeScale::mean), json);
+    // Only for someone who watches.
+    std::function<void(double)> progress;
+    if (isatty(STDERR_FILENO) != 0) {
+      progress = [](double done) {
+        std::cerr << "\rmb-envmap: " << static_cast<int>(100.0 * done) << " %" << (done < 1.0 ? "" : "\n")
+                  << std::flush;
+      };
+    }
+    output_.save(Convolver(source).apply(lobe, target, sum ? LobeScale::sum : LobeScale::mean, progress),
+                 json);
     write_split_sum();
   }
 

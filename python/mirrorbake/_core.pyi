@@ -2036,7 +2036,7 @@ class Convolver:
 
     def __init__(self, layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> None: ...
 
-    def apply(self, lobe: Lobe, projection: str, width: int, height: int, scale: Literal['mean', 'sum']) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
+    def apply(self, lobe: Lobe, projection: str, width: int, height: int, scale: Literal['mean', 'sum'], progress: Callable[[float], None] | None = None) -> tuple[EnvMapLayout, NDArray[numpy.float32]]:
         """Layout and values of the map, by the direction of the lobe's axis."""
 
     def sample(self, lobe: Lobe, directions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], scale: Literal['mean', 'sum'], channels: int) -> NDArray[numpy.float32]:

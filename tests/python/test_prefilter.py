@@ -55,6 +55,21 @@ def test_maps_and_single_directions_agree(sky: EnvMap) -> None:
         np.testing.assert_allclose(several.sample(lobe, directions), faces, rtol=tolerance)
 
 
+def test_progress_is_told_and_may_end_the_work(sky: EnvMap) -> None:
+    done: list[float] = []
+    Prefilter(sky).apply(phong(30), 16, progress=done.append)
+    assert done == sorted(done)
+    assert done[-1] == 1.0
+
+    def stop(share: float) -> None:
+        raise RuntimeError(f"enough at {share}")
+
+    several = Prefilter(sky)
+    with pytest.raises(RuntimeError, match="enough"):
+        several.apply(phong(30), 16, progress=stop)
+    np.testing.assert_array_equal(several.apply(phong(30), 8).values, prefilter(sky, phong(30), 8).values)
+
+
 def test_sums_are_means_times_the_integral_of_the_lobe(sky: EnvMap) -> None:
     lobe = ggx(0.4)
     sums = prefilter(sky, lobe, 4, scale="sum").values

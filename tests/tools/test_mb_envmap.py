@@ -352,6 +352,8 @@ def test_a_fisheye_photograph_of_the_sky_is_brought_to_its_place(tmp_path: Path)
         (("--turn", "nan"), "--turn is"),
         (("--turn", 5, "--exposure", "nan"), "nan is not within -20 to 20 stops"),
         (("--turn", 5, "--exposure", 99), "99 is not within -20 to 20 stops"),
+        (("--turn", 5, "--exposure", "1x"), "1x is not within -20 to 20 stops"),
+        (("--turn", 5, "--exposure", "+-1"), "+-1 is not within -20 to 20 stops"),
     ],
 )
 def test_turns_and_exposures_that_are_no_numbers_are_refused(

@@ -21,6 +21,7 @@ namespace {
 
 // Lobes that need smaller nodes than this, in radians, are summed texel by texel: Phong from N = 5,625.
 constexpr double kNarrow = 0.008;
+constexpr std::size_t kReports = 50;  // of progress, for every three channels
 // Steps of the table of weights of narrow lobes, by (1 − cos γ)/2: 3e-6 of a weight between them.
 constexpr std::size_t kNarrowSteps = 4096;
 
@@ -37,6 +38,16 @@ bool is_narrow(const Lobe& lobe, const LobePlan& plan) {
 struct Tile {
   std::array<std::size_t, kOutputs> output{};  ///< number of the texel, or of the direction
   std::size_t count = 0;
+};
+
+// What is to be made, of up to three channels at a time.
+struct Job {
+  std::span<const glm::vec3> directions;
+  const std::vector<Tile>& tiles;
+  LobeScale scale;
+  std::span<float> values;
+  const std::function<void(double)>& progress;
+  int first_channel = 0;
 };
 
 }  // namespace
@@ -65,46 +76,54 @@ struct Convolver::State {
     return grids.try_emplace({cells, parts}, map, first_channel, texels_of(parts), cells).first->second;
   }
 
-  void store(std::span<float> values, std::size_t output, int first_channel, const double* sums,
-             std::size_t stride, LobeScale scale) const {
+  // A loop over outputs, which reports now and then.
+  void for_outputs(const Job& job, std::size_t count, std::size_t grain,
+                   const std::function<void(std::size_t, std::size_t)>& body) const {
+    if (!job.progress) return parallel_for(count, grain, body);
+    const double groups = (map.layout.channels + 2) / 3;
+    const std::size_t step = (count / kReports / grain + 1) * grain;
+    for (std::size_t at = 0; at < count; at += step) {
+      const std::size_t size = std::min(step, count - at);
+      parallel_for(size, grain, [&](std::size_t begin, std::size_t end) { body(at + begin, at + end); });
+      const double done = static_cast<double>(at + size) / static_cast<double>(count);
+      job.progress((job.first_channel / 3 + done) / groups);
+    }
+  }
+
+  void store(const Job& job, std::size_t output, const double* sums, std::size_t stride) const {
     const std::size_t channels = static_cast<std::size_t>(map.layout.channels);
-    const std::size_t first = static_cast<std::size_t>(first_channel);
-    const double divisor = scale == LobeScale::mean ? sums[3 * stride] : 1.0;
+    const std::size_t first = static_cast<std::size_t>(job.first_channel);
+    const double divisor = job.scale == LobeScale::mean ? sums[3 * stride] : 1.0;
     for (std::size_t c = 0; c < 3 && first + c < channels; ++c) {
-      values[output * channels + first + c] =
+      job.values[output * channels + first + c] =
           divisor > 0.0 ? static_cast<float>(sums[c * stride] / divisor) : 0.0F;
     }
   }
 
-  void cosine(std::span<const glm::vec3> directions, int first_channel, LobeScale scale,
-              std::span<float> values) {
+  void cosine(const Job& job) {
     const int parts = parts_for_width(map.layout, 0.25);
     TexelBlocks& tree = blocks_of(parts);
     const auto known = moments.find(parts);
-    if (known == moments.end() || known->second != first_channel) {
-      tree.make_moments(map, first_channel, texels_of(parts));
-      moments[parts] = first_channel;
+    if (known == moments.end() || known->second != job.first_channel) {
+      tree.make_moments(map, job.first_channel, texels_of(parts));
+      moments[parts] = job.first_channel;
     }
-    parallel_for(directions.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for_outputs(job, job.directions.size(), 16, [&](std::size_t begin, std::size_t end) {
       std::vector<std::uint32_t> leaves;
       for (std::size_t i = begin; i < end; ++i) {
         const std::array<double, 4> sums =
-            tree.sum_cosines(glm::normalize(glm::dvec3(directions[i])), leaves);
-        store(values, i, first_channel, sums.data(), 1, scale);
+            tree.sum_cosines(glm::normalize(glm::dvec3(job.directions[i])), leaves);
+        store(job, i, sums.data(), 1);
       }
     });
   }
 
-  void narrow(const Lobe& lobe, const LobePlan& plan, std::span<const glm::vec3> directions,
-              int first_channel, LobeScale scale, std::span<float> values);
-  void wide(const LobePlan& plan, std::span<const glm::vec3> directions, const std::vector<Tile>& tiles,
-            int first_channel, LobeScale scale, std::span<float> values);
-  void apply(const Lobe& lobe, std::span<const glm::vec3> directions, const std::vector<Tile>& tiles,
-             LobeScale scale, std::span<float> values);
+  void narrow(const Lobe& lobe, const LobePlan& plan, const Job& job);
+  void wide(const LobePlan& plan, const Job& job);
+  void apply(const Lobe& lobe, Job job);
 };
 
-void Convolver::State::narrow(const Lobe& lobe, const LobePlan& plan, std::span<const glm::vec3> directions,
-                              int first_channel, LobeScale scale, std::span<float> values) {
+void Convolver::State::narrow(const Lobe& lobe, const LobePlan& plan, const Job& job) {
   const int parts = parts_for_width(map.layout, plan.width);
   const SourceTexels& pieces = texels_of(parts);
   const TexelBlocks& tree = blocks_of(1);
@@ -118,7 +137,8 @@ void Convolver::State::narrow(const Lobe& lobe, const LobePlan& plan, std::span<
   const double per_h = static_cast<double>(kNarrowSteps) / cut_h;
   const double reach = plan.cut + (parts > 1 ? texel_width(map.layout) : 0.0);
   const std::size_t channels = static_cast<std::size_t>(map.layout.channels);
-  const std::size_t used = std::min<std::size_t>(3, channels - static_cast<std::size_t>(first_channel));
+  const std::size_t first_channel = static_cast<std::size_t>(job.first_channel);
+  const std::size_t used = std::min<std::size_t>(3, channels - first_channel);
   const double integral = lobe_integral(lobe);
   const auto weight_at = [&](double squared_chord) {
     const double position = 0.25 * squared_chord * per_h;
@@ -129,10 +149,10 @@ void Convolver::State::narrow(const Lobe& lobe, const LobePlan& plan, std::span<
   };
   const std::size_t width = static_cast<std::size_t>(map.layout.width);
   const std::size_t height = static_cast<std::size_t>(map.layout.height);
-  parallel_for(directions.size(), 16, [&](std::size_t begin, std::size_t end) {
+  for_outputs(job, job.directions.size(), 16, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> found;
     for (std::size_t i = begin; i < end; ++i) {
-      const glm::dvec3 r = glm::normalize(glm::dvec3(directions[i]));
+      const glm::dvec3 r = glm::normalize(glm::dvec3(job.directions[i]));
       found.clear();
       tree.find_near(r, reach, found);
       std::array<double, 4> sums{};
@@ -152,7 +172,7 @@ void Convolver::State::narrow(const Lobe& lobe, const LobePlan& plan, std::span<
             }
           }
         }
-        const float* texel = map.values.data() + t * channels + static_cast<std::size_t>(first_channel);
+        const float* texel = map.values.data() + t * channels + first_channel;
         for (std::size_t c = 0; c < used; ++c) sums[c] += w * static_cast<double>(texel[c]);
         sums[3] += w;
       }
@@ -163,42 +183,40 @@ void Convolver::State::narrow(const Lobe& lobe, const LobePlan& plan, std::span<
           const std::size_t at = map.layout.index(0, p.face, texel_index(-p.y, map.layout.height),
                                                   texel_index(p.x, map.layout.width));
           for (std::size_t c = 0; c < used; ++c) {
-            sums[c] =
-                integral * static_cast<double>(map.values[at + static_cast<std::size_t>(first_channel) + c]);
+            sums[c] = integral * static_cast<double>(map.values[at + first_channel + c]);
           }
           sums[3] = integral;
         }
       }
-      store(values, i, first_channel, sums.data(), 1, scale);
+      store(job, i, sums.data(), 1);
     }
   });
 }
 
-void Convolver::State::wide(const LobePlan& plan, std::span<const glm::vec3> directions,
-                            const std::vector<Tile>& tiles, int first_channel, LobeScale scale,
-                            std::span<float> values) {
+void Convolver::State::wide(const LobePlan& plan, const Job& job) {
   const int cells = MomentGrid::cells_for(plan.finest());
-  const MomentGrid& grid = grid_of(first_channel, cells, parts_for_width(map.layout, plan.width));
+  const MomentGrid& grid = grid_of(job.first_channel, cells, parts_for_width(map.layout, plan.width));
   const AccumulateLoop accumulate = accumulate_loop();
-  parallel_for(tiles.size(), 4, [&](std::size_t begin, std::size_t end) {
+  for_outputs(job, job.tiles.size(), 4, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> list;
     for (std::size_t i = begin; i < end; ++i) {
-      const Tile& tile = tiles[i];
+      const Tile& tile = job.tiles[i];
       std::array<float, kOutputs> x{};
       std::array<float, kOutputs> y{};
       std::array<float, kOutputs> z{};
       glm::dvec3 middle(0.0);
       for (std::size_t k = 0; k < kOutputs; ++k) {
-        const glm::vec3 d = directions[tile.output[std::min(k, tile.count - 1)]];
+        const glm::vec3 d = job.directions[tile.output[std::min(k, tile.count - 1)]];
         x[k] = d.x;
         y[k] = d.y;
         z[k] = d.z;
         middle += glm::dvec3(d);
       }
-      middle = glm::length(middle) > 0.0 ? glm::normalize(middle) : glm::dvec3(directions[tile.output[0]]);
+      middle =
+          glm::length(middle) > 0.0 ? glm::normalize(middle) : glm::dvec3(job.directions[tile.output[0]]);
       double radius = 0.0;
       for (std::size_t k = 0; k < tile.count; ++k) {
-        radius = std::max(radius, glm::length(middle - glm::dvec3(directions[tile.output[k]])));
+        radius = std::max(radius, glm::length(middle - glm::dvec3(job.directions[tile.output[k]])));
       }
       const std::array<float, 3> center{static_cast<float>(middle.x), static_cast<float>(middle.y),
                                         static_cast<float>(middle.z)};
@@ -208,23 +226,22 @@ void Convolver::State::wide(const LobePlan& plan, std::span<const glm::vec3> dir
       accumulate(grid.nodes(), list.data(), list.size(), x.data(), y.data(), z.data(), plan.terms,
                  sums.data());
       for (std::size_t k = 0; k < tile.count; ++k) {
-        store(values, tile.output[k], first_channel, sums.data() + k, kOutputs, scale);
+        store(job, tile.output[k], sums.data() + k, kOutputs);
       }
     }
   });
 }
 
-void Convolver::State::apply(const Lobe& lobe, std::span<const glm::vec3> directions,
-                             const std::vector<Tile>& tiles, LobeScale scale, std::span<float> values) {
+void Convolver::State::apply(const Lobe& lobe, Job job) {
   LobePlan plan;
   make_plan(lobe, plan);
-  for (int first = 0; first < map.layout.channels; first += 3) {
+  for (; job.first_channel < map.layout.channels; job.first_channel += 3) {
     if (is_cosine(lobe)) {
-      cosine(directions, first, scale, values);
+      cosine(job);
     } else if (is_narrow(lobe, plan)) {
-      narrow(lobe, plan, directions, first, scale, values);
+      narrow(lobe, plan, job);
     } else {
-      wide(plan, directions, tiles, first, scale, values);
+      wide(plan, job);
     }
   }
 }
@@ -242,7 +259,8 @@ Convolver::~Convolver() = default;
 Convolver::Convolver(Convolver&&) noexcept = default;
 Convolver& Convolver::operator=(Convolver&&) noexcept = default;
 
-EnvMap Convolver::apply(const Lobe& lobe, const PrefilterTarget& target, LobeScale scale) {
+EnvMap Convolver::apply(const Lobe& lobe, const PrefilterTarget& target, LobeScale scale,
+                        const std::function<void(double)>& progress) {
   const EnvMapView& map = state_->map;
   validate(lobe);
   const EnvMapLayout layout{target.projection, target.width, target.height, 1, map.layout.channels};
@@ -254,6 +272,7 @@ EnvMap Convolver::apply(const Lobe& lobe, const PrefilterTarget& target, LobeSca
     finest.values = map.level(0);
     EnvMap result = resample(finest, target.projection, target.width, target.height);
     result.channels.assign(map.channels.begin(), map.channels.end());
+    if (progress) progress(1.0);
     return result;
   }
   EnvMap result = make_envmap(layout, map.channels);
@@ -282,7 +301,7 @@ EnvMap Convolver::apply(const Lobe& lobe, const PrefilterTarget& target, LobeSca
       }
     }
   }
-  state_->apply(lobe, directions, tiles, scale, result.values);
+  state_->apply(lobe, {directions, tiles, scale, result.values, progress});
   return result;
 }
 
@@ -306,7 +325,8 @@ void Convolver::apply(const Lobe& lobe, std::span<const glm::vec3> directions, L
     tiles[i].output[0] = i;
     tiles[i].count = 1;
   }
-  state_->apply(lobe, unit, tiles, scale, values);
+  const std::function<void(double)> silent;
+  state_->apply(lobe, {unit, tiles, scale, values, silent});
 }
 
 EnvMap irradiance(const EnvMapView& map, const PrefilterTarget& target) {

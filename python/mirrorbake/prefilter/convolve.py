@@ -82,6 +82,7 @@ class Prefilter:
         projection: str = "cube",
         *,
         scale: LobeScale = "mean",
+        progress: Callable[[float], None] | None = None,
     ) -> EnvMap:
         """Return the map of the lobe by the direction of its axis.
 
@@ -96,6 +97,8 @@ class Prefilter:
         scale
             ``mean``: the weighted mean, which keeps white white. ``sum``: ∫ weight L dω, as [AEM] eq. 7 has
             it, in radiance times steradian.
+        progress
+            Called with the share of the texels that are done, rising to 1.
 
         Raises
         ------
@@ -103,7 +106,7 @@ class Prefilter:
             For unknown names and sizes that are not 1 to 65536, and for the sum of a mirror.
         """
         height, width = height_and_width(projection, size)
-        layout, values = self._convolver.apply(lobe, projection, width, height, scale)
+        layout, values = self._convolver.apply(lobe, projection, width, height, scale, progress)
         return EnvMap(layout, values, list(self._channels))
 
     def sample(

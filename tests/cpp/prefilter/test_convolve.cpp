@@ -211,6 +211,23 @@ TEST(Convolve, ThreadsAndInstructionSetsGiveTheSameBits) {
   }
 }
 
+TEST(Convolve, ProgressRisesToOneAndChangesNothing) {
+  EnvMap map = make_envmap({{ProjectionKind::latlong}, 64, 32, 1, 4});
+  for (std::size_t i = 0; i < map.values.size(); ++i) map.values[i] = static_cast<float>(i % 17);
+  const PrefilterTarget target{{ProjectionKind::cube}, 16, 16};
+  Convolver convolver(map);
+  for (const Lobe& lobe : {Lobe{LobeKind::lambert}, Lobe{LobeKind::phong, 20.0}, Lobe{LobeKind::phong, 1e4},
+                           Lobe{LobeKind::ggx, 1.0, 0.0}}) {
+    std::vector<double> done;
+    const auto progress = [&](double share) { done.push_back(share); };
+    const EnvMap watched = convolver.apply(lobe, target, LobeScale::mean, progress);
+    EXPECT_EQ(watched.values, convolver.apply(lobe, target).values);
+    EXPECT_TRUE(std::is_sorted(done.begin(), done.end()));
+    EXPECT_EQ(done.back(), 1.0);
+    EXPECT_GT(done.size(), is_mirror(lobe) ? 0U : 40U);
+  }
+}
+
 TEST(Convolve, AChainRunsFromTheMapToTheCosineLobe) {
   const EnvMap map = testing::sunny_panorama(32);
   ChainOptions options;

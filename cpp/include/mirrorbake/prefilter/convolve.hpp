@@ -40,8 +40,10 @@ class Convolver {
   Convolver(Convolver&&) noexcept;
   Convolver& operator=(Convolver&&) noexcept;
 
-  /// Throws InvalidArgument for a lobe or a target that is not valid.
-  EnvMap apply(const Lobe& lobe, const PrefilterTarget& target, LobeScale scale = LobeScale::mean);
+  /// Throws InvalidArgument for a lobe or a target that is not valid. `progress` is called with the share of
+  /// the texels that are done, rising to 1, by the thread that called.
+  EnvMap apply(const Lobe& lobe, const PrefilterTarget& target, LobeScale scale = LobeScale::mean,
+               const std::function<void(double done)>& progress = {});
 
   /// At unit directions: directions.size() × channels values.
   void apply(const Lobe& lobe, std::span<const glm::vec3> directions, LobeScale scale,

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mirrorbake.pem.export.blocks import blocks_of, filled, pixels_of
 from mirrorbake.pem.export.images import ImageFormat, probe_image
 from mirrorbake.pem.export.mesh_file import ReflectorMesh, octahedral, write_mesh
 from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_atlas, level_place, to_atlas
+from mirrorbake.pem.export.source import ExportSource
 from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.pem.pyramid import FACES, Projection
 from viewer_cases import Case, CasePem, Scene, case_scene, case_source, cases, irradiance
@@ -275,3 +277,70 @@ def test_an_exact_image_of_a_map_holds_its_codes(scene: Scene) -> None:
     assert np.array_equal(from_atlas(atlas, 32), code.encode(pyramid[:, :3]))
     alpha = form.decode(web.read("samples/00001/0.alpha.webp"))
     assert np.array_equal(from_atlas(alpha, 32)[:, 0], np.rint(pyramid[:, 3] * 255.0))
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_blocks_of_an_atlas_hold_the_texels_that_are_read_and_hardly_more(projection: Projection) -> None:
+    size = 32
+    count = sum(FACES[projection] * (size >> level) ** 2 for level in range(size.bit_length()))
+    read = np.zeros(count, np.bool_)
+    read[[5, 700, count - 9]] = True
+    blocks = blocks_of(read, size, projection)
+    height, width = atlas_shape(size, projection)
+    pixels = pixels_of(blocks, height, width)
+    assert pixels.shape == (height, width)
+    assert from_atlas(pixels[..., None].astype(np.uint8), size, projection)[read].all()
+    assert blocks.sum() == 3
+
+
+def test_pixels_that_nobody_reads_are_filled_smoothly_and_the_others_are_kept() -> None:
+    image = np.random.default_rng(3).integers(0, 256, (48, 40, 3), np.uint8)
+    known = np.zeros((48, 40), np.bool_)
+    known[8:16, 8:24] = True
+    result = filled(image, known)
+    assert np.array_equal(result[known], image[known])
+    # Beyond the smallest aligned square of 32 pixels that holds them all there is their mean alone.
+    assert np.abs(result[40, 36].astype(float) - image[known].mean(axis=0)).max() <= 0.5
+    assert len(ImageFormat(exact=False).encode(result)) < 0.3 * len(ImageFormat(exact=False).encode(image))
+    nothing = filled(image, np.zeros((48, 40), np.bool_))
+    assert (nothing == 0).all()
+
+
+def fading() -> tuple[Case, ExportSource]:
+    case = next(case for case in cases() if case.fade_degrees is not None)
+    return case, case_source(case, case_scene(case), CasePem())
+
+
+def test_a_sample_holds_what_is_read_near_it_and_the_static_set_the_rest() -> None:
+    _, source = fading()
+    texels = len(source.pyramid(0, 0))
+    read = np.zeros(texels, np.bool_)
+    read[: 4 * 32] = True
+    trimmed = replace(source, reads=lambda sample: [read] * len(source.maps))
+    web, whole = WebPem(trimmed, WebOptions()), WebPem(source, WebOptions())
+    manifest = json.loads(web.read("manifest.json"))
+    for sample in manifest["samples"]:
+        bits = np.unpackbits(np.frombuffer(gzip.decompress(web.read(sample["blocks"])), np.uint8))
+        # 96 × 96 pixels; four rows of 32 texels are four blocks.
+        assert len(bits) == len(source.maps) * 144
+        assert bits.sum() == len(source.maps) * 4
+    name = manifest["samples"][0]["maps"][0]["radiance"] + ".avif"
+    assert len(web.read(name)) < 0.5 * len(whole.read(name))
+    # A page can put a sample together as soon as its files are there.
+    order = web.names
+    assert order.index("static/2.avif") < order.index(manifest["samples"][1]["blocks"]) < order.index(name)
+
+
+@pytest.mark.parametrize(
+    "options", [WebOptions(trim=False), WebOptions(ImageFormat(exact=True)), WebOptions(fallback=False)]
+)
+def test_nothing_is_left_out_where_it_is_not_wanted_or_nothing_could_stand_in(options: WebOptions) -> None:
+    _, source = fading()
+
+    def fail(sample: int) -> list[NDArray[np.bool_]]:
+        raise AssertionError(sample)
+
+    if options.trim and not options.format.exact:
+        source = replace(source, static_maps=None, fade_degrees=None)
+    manifest = json.loads(WebPem(replace(source, reads=fail), options).read("manifest.json"))
+    assert [sample["blocks"] for sample in manifest["samples"]] == [None] * 3

@@ -337,6 +337,7 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
         maps=tuple(MapEntry(f"map {m}", case.map_size, opaque=MAPS[m] == 3) for m in range(count)),
         pyramid=pem.pyramid,
         static_maps=None if case.fade_degrees is None else tuple(pem.static_maps[:count]),
+        reads=None,
         fade_degrees=case.fade_degrees,
         still=lambda sample: np.full((HEIGHT, WIDTH, 3), 0.2 + 0.2 * sample, np.float32),
         mesh=scene.mesh,

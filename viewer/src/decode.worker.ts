@@ -1,9 +1,13 @@
 /// Decodes images away from the page's own thread, and expands their codes before anything is filtered.
 
 import { assembleAlpha, assembleRadiance, atlasSize, packSharedExponent, radianceTable } from "./atlas";
+import { keptPixels, replaceBlocks } from "./blocks";
 import type { Decoded, DecodeRequest } from "./decoder";
 
 const MOST_PIXELS = 1 << 26;
+
+/// Images of the static set, without the channels that they do not use.
+const kept = new Map<string, Uint8Array>();
 
 async function pixelsOf(bytes: ArrayBuffer, type: string): Promise<ImageData> {
   const bitmap = await createImageBitmap(new Blob([bytes], { type }), {
@@ -45,6 +49,13 @@ async function decode(request: DecodeRequest): Promise<Decoded> {
   const expected = atlasSize(size, projection);
   if (width !== expected.width || height !== expected.height) {
     throw new Error(`is ${width}×${height} pixels, not ${expected.width}×${expected.height}`);
+  }
+  const channels = request.kind === "alpha" ? 1 : 3;
+  if (request.keep) kept.set(request.keep, keptPixels(data, channels));
+  if (request.base && request.blocks) {
+    const base = kept.get(request.base);
+    if (!base) throw new Error(`needs ${request.base}, which is not there`);
+    replaceBlocks(data, width, height, request.blocks, base, channels);
   }
   if (request.kind === "alpha") return { width, height, alpha: assembleAlpha(data, size, projection) };
   const packed = assembleRadiance(data, size, projection, radianceTable(request.code));

@@ -8,10 +8,19 @@ import type { Projection } from "./manifest";
 export type DecodeRequest = { bytes: ArrayBuffer; type: string } & (
   | { kind: "probe" }
   | { kind: "still"; code: RadianceCode }
-  | { kind: "radiance"; size: number; projection: Projection; code: RadianceCode }
-  | { kind: "alpha"; size: number; projection: Projection }
+  | ({ kind: "radiance"; size: number; projection: Projection; code: RadianceCode } & Parts)
+  | ({ kind: "alpha"; size: number; projection: Projection } & Parts)
   | { kind: "texture" }
 );
+
+/// Of an image that is kept for others, or is made whole by one that was.
+interface Parts {
+  /// Under which the decoded image is kept.
+  keep?: string;
+  /// Name of a kept image, which all blocks come from that are not the image's own.
+  base?: string;
+  blocks?: Uint8Array;
+}
 
 export interface Decoded {
   width: number;

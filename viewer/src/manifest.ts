@@ -81,6 +81,8 @@ export interface MapFiles {
 export interface Sample {
   parameter: number[];
   maps: MapFiles[];
+  /// File that says which blocks of its images are the sample's own; all others are the static set's. null: all are its own.
+  blocks: string | null;
   still: string | null;
   /// File of the vertices' irradiance, if it changes from sample to sample.
   irradiance: string | null;
@@ -158,7 +160,7 @@ export interface Manifest {
   first: number;
 }
 
-const VERSION = 3;
+const VERSION = 4;
 
 const LARGEST_MESH = 1 << 30;
 
@@ -408,6 +410,7 @@ function checkedManifest(text: string): Manifest {
       sample.parameter.every(Number.isFinite) &&
       areMaps(sample.maps, data.maps) &&
       (sample.still === null || isName(sample.still)) &&
+      (sample.blocks === null || (isName(sample.blocks) && data.static?.maps !== null)) &&
       (sample.irradiance === null || isName(sample.irradiance));
     if (!fits) damaged("a sample does not have all maps");
   }

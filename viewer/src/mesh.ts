@@ -13,7 +13,8 @@ export interface Mesh {
   indices: Uint32Array;
 }
 
-async function inflate(bytes: ArrayBuffer): Promise<Uint8Array> {
+/// What gzip made smaller.
+export async function inflate(bytes: ArrayBuffer): Promise<Uint8Array> {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }

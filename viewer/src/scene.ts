@@ -1,5 +1,6 @@
 /// Everything that is loaded, and one picture of it: the viewer without its controls.
 
+import { decodeBlocks } from "./blocks";
 import { SampleCache } from "./cache";
 import { type Decoded, type DecodeRequest, Decoder, sameColours } from "./decoder";
 import { UserError } from "./errors";
@@ -45,6 +46,8 @@ export class Scene {
   private readonly frame: FrameState;
   private hasStatic = false;
   private hasSet = false;
+  /// Settles when the static set is there, of which samples without all blocks of their own take the others.
+  private set: Promise<void> = Promise.resolve();
   private readonly here: number[];
   private readonly nearest: Blend;
 
@@ -324,7 +327,8 @@ export class Scene {
     const { maps } = this.manifest.static;
     if (maps === null) return;
     // Not waited for: the captured map and the samples do for a while.
-    this.loadMaps(maps, renderer.pool.setSlot).then(
+    this.set = this.loadMaps(maps, renderer.pool.setSlot, null);
+    this.set.then(
       () => {
         if (renderer !== this.renderer) return;
         this.hasSet = true;
@@ -353,17 +357,24 @@ export class Scene {
   }
 
   private async loadSample(sample: number, slot: number): Promise<void> {
-    const { maps, irradiance } = this.manifest.samples[sample];
+    const { maps, irradiance, blocks } = this.manifest.samples[sample];
     await Promise.all([
-      this.loadMaps(maps, slot),
+      this.loadMaps(maps, slot, blocks),
       irradiance === null ? undefined : this.loadIrradiance(irradiance, slot),
     ]);
   }
 
   /// The maps of a sample, or of the static set, into a slot.
-  private async loadMaps(maps: MapFiles[], slot: number): Promise<void> {
+  private async loadMaps(maps: MapFiles[], slot: number, blocksFile: string | null): Promise<void> {
     const { renderer } = this;
     const { radiance: code, projection } = this.manifest;
+    const isSet = slot === renderer.pool.setSlot;
+    const own = blocksFile === null ? null : await this.ownBlocks(blocksFile);
+    const parts = (number: number, channels: string) => {
+      const name = `${channels} ${number}`;
+      if (isSet) return { keep: name };
+      return own === null ? {} : { base: name, blocks: own[number] };
+    };
     await Promise.all(
       maps.map(async (map, number) => {
         const { size } = this.manifest.maps[number];
@@ -375,15 +386,33 @@ export class Scene {
             size,
             projection,
             code,
+            ...parts(number, "radiance"),
           })),
           map.alpha === null
             ? undefined
-            : this.decoded(map.alpha, (bytes, type) => ({ kind: "alpha", bytes, type, size, projection })),
+            : this.decoded(map.alpha, (bytes, type) => ({
+                kind: "alpha",
+                bytes,
+                type,
+                size,
+                projection,
+                ...parts(number, "alpha"),
+              })),
         ]);
         if (renderer !== this.renderer || !light.packed) return;
         renderer.uploadMap(slot, number, light.packed, cover?.alpha);
       }),
     );
+  }
+
+  /// Which blocks of its maps are a sample's own, once those of the static set are there.
+  private async ownBlocks(name: string): Promise<Uint8Array[]> {
+    const { maps, projection } = this.manifest;
+    const [blocks] = await Promise.all([
+      this.files.read(name).then((bytes) => decodeBlocks(name, bytes, maps, projection)),
+      this.set,
+    ]);
+    return blocks;
   }
 
   private async decoded(

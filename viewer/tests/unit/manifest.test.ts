@@ -34,7 +34,7 @@ function written() {
   ];
   return {
     format: "mirrorbake-web",
-    version: 3,
+    version: 4,
     library: "0.1.0",
     title: "teapot",
     notes: [],
@@ -104,6 +104,7 @@ function written() {
     samples: [0, 1].map((k) => ({
       parameter: [k],
       maps: maps(`samples/0000${k}`),
+      blocks: null,
       still: `samples/0000${k}/still`,
       irradiance: null,
     })),
@@ -165,6 +166,7 @@ const NAMES: Path[] = [
   ["samples", 0, "maps", 0, "radiance"],
   ["samples", 0, "maps", 0, "alpha"],
   ["samples", 1, "still"],
+  ["samples", 1, "blocks"],
   ["static", "image"],
   ["static", "maps", 1, "radiance"],
   ["textures", 0, "image"],

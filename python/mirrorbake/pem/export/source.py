@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,10 +11,13 @@ import numpy as np
 from mirrorbake.pem.export.map_sets import run_time_attributes
 from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
+from mirrorbake.pem.export.reads import texels_read
 from mirrorbake.pem.pyramid import pyramid_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.opened import OpenedPem
@@ -72,6 +76,8 @@ class ExportSource:
     """`pyramid(sample, map)`: all levels of a map, (texels, 3) or, not opaque, (texels, 4)."""
     static_maps: tuple[FloatArray, ...] | None
     """The static set: the pyramids of all maps, drawn far from the samples; None if there is none."""
+    reads: Callable[[int], Sequence[NDArray[np.bool_]]] | None
+    """`reads(sample)`: the texels (texels,) of each map that views near a sample read; None: all count."""
     fade_degrees: float | None
     """Degrees beyond the samples at which half of what is drawn is the static set."""
     still: Callable[[int], FloatArray]
@@ -150,6 +156,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
         maps=tuple(MapEntry(entry.name, header.map_size, entry.channels == 3) for entry in header.maps),
         pyramid=pyramid,
         static_maps=static_maps,
+        reads=partial(texels_read, pem),
         fade_degrees=None if fade is None or static_maps is None else fade["degrees"],
         still=lambda sample: store.read_images(sample).beauty,
         mesh=ReflectorMesh(

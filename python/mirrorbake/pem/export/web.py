@@ -5,18 +5,21 @@
 
 from __future__ import annotations
 
+import gzip
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.pem.export.blocks import blocks_of, filled, pixels_of
 from mirrorbake.pem.export.images import ImageFormat, linear_codes, probe_image, srgb_codes
 from mirrorbake.pem.export.mesh_file import write_irradiance, write_mesh
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
 from mirrorbake.pem.pyramid import FACES
+from mirrorbake.tone import srgb_bytes, tone_map
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,11 +31,15 @@ if TYPE_CHECKING:
     from mirrorbake.pem.export.source import ExportSource
 
 FORMAT_NAME = "mirrorbake-web"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 MANIFEST_NAME = "manifest.json"
 
 PROBED_SAMPLES = 16
 """Samples that are read to find the range of the radiance; brighter texels of others are clamped."""
+
+
+STATIC_SET_QUALITY = 25
+"""By which the static set's AVIF images are worse: where it shows, it is far from ray tracing by itself."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +51,9 @@ class WebOptions:
     """Also write images without loss, which the page takes if a browser shows the others wrongly."""
     stills: bool = True
     """The ray-traced pictures of the samples, to compare with."""
+    trim: bool = True
+    """Of a sample only what views near it read, the rest from the static set, if there is one. Images without
+    loss alone hold everything."""
     texture_size: int = 1024
     """Pixels along a side that textures of the materials have at most."""
 
@@ -66,6 +76,10 @@ class WebPem:
         self._code = _code_of(source)
         self._makers: dict[str, Callable[[], bytes]] = {}
         self._first = len(source.space) // 2
+        exact = self._options.format.exact
+        trims = self._options.trim and not exact and source.static_maps is not None
+        self._reads = source.reads if trims else None
+        self._blocks: tuple[int, list[NDArray[np.bool_]]] | None = None
         self._collect()
 
     @property
@@ -101,40 +115,76 @@ class WebPem:
         )
         for t in range(len(source.materials.textures)):
             self._add(_texture_name(t), partial(self._texture, t))
-        # The sample that is shown first, then outwards from it.
+        # Samples may need the static set. Then the one that is shown first, and outwards from it.
+        if source.static_maps is not None:
+            self._add_maps("static", source.static_maps.__getitem__, None)
         for i in sorted(range(len(source.space)), key=lambda i: abs(i - self._first)):
             if source.irradiance is not None:
                 self._makers[_irradiance_name(i)] = partial(self._irradiance, i)
-            self._add_maps(f"samples/{i:05d}", partial(source.pyramid, i))
-            if i == self._first and source.static_maps is not None:
-                self._add_maps("static", source.static_maps.__getitem__)
+            if self._reads is not None:
+                self._makers[_blocks_name(i)] = partial(self._packed_blocks, i)
+            self._add_maps(f"samples/{i:05d}", partial(source.pyramid, i), i)
         if options.stills:
             for i in range(len(source.space)):
                 self._add(_still_name(i), partial(self._still, i))
 
-    def _add_maps(self, folder: str, pyramid: Callable[[int], FloatArray]) -> None:
+    def _add_maps(self, folder: str, pyramid: Callable[[int], FloatArray], sample: int | None) -> None:
         """Add the images of all maps of a sample, or of the static set."""
+        form = self._options.format
+        if sample is None:
+            form = replace(form, quality=max(form.quality - STATIC_SET_QUALITY, 1))
         for m, entry in enumerate(self._source.maps):
-            self._add(f"{folder}/{m}", partial(self._radiance, pyramid, m))
+            self._add(f"{folder}/{m}", partial(self._radiance, pyramid, m, sample), form)
             if not entry.opaque:
-                self._add(f"{folder}/{m}.alpha", partial(self._alpha, pyramid, m))
+                self._add(f"{folder}/{m}.alpha", partial(self._alpha, pyramid, m, sample), form)
 
-    def _add(self, name: str, pixels: Callable[[], NDArray[np.uint8]]) -> None:
-        form, exact = self._options.format, ImageFormat(exact=True)
-        self._makers[name + form.suffix] = lambda: form.encode(pixels())
+    def _add(
+        self, name: str, pixels: Callable[[], NDArray[np.uint8]], form: ImageFormat | None = None
+    ) -> None:
+        lossy, exact = form or self._options.format, ImageFormat(exact=True)
+        self._makers[name + lossy.suffix] = lambda: lossy.encode(pixels())
         if self._options.has_fallback:
             self._makers[f"exact/{name}{exact.suffix}"] = lambda: exact.encode(pixels())
 
     def _poster(self) -> bytes:
-        return ImageFormat(exact=False, quality=70).encode(display_codes(self._source.still(self._first)))
+        return ImageFormat(exact=False, quality=70).encode(
+            srgb_bytes(tone_map(self._source.still(self._first)))
+        )
 
-    def _radiance(self, pyramid: Callable[[int], FloatArray], number: int) -> NDArray[np.uint8]:
+    def _radiance(
+        self, pyramid: Callable[[int], FloatArray], number: int, sample: int | None
+    ) -> NDArray[np.uint8]:
         codes = self._code.encode(pyramid(number)[:, :3])
-        return to_atlas(codes, self._source.maps[number].size, self._source.projection)
+        return self._atlas(codes, number, sample)
 
-    def _alpha(self, pyramid: Callable[[int], FloatArray], number: int) -> NDArray[np.uint8]:
+    def _alpha(
+        self, pyramid: Callable[[int], FloatArray], number: int, sample: int | None
+    ) -> NDArray[np.uint8]:
         alpha = np.rint(np.clip(pyramid(number)[:, 3:4], 0.0, 1.0) * 255.0).astype(np.uint8)
-        return to_atlas(alpha, self._source.maps[number].size, self._source.projection)[..., 0]
+        return self._atlas(alpha, number, sample)[..., 0]
+
+    def _atlas(self, codes: NDArray[np.uint8], number: int, sample: int | None) -> NDArray[np.uint8]:
+        """Return the image of a map, filled where a sample's is not read."""
+        atlas = to_atlas(codes, self._source.maps[number].size, self._source.projection)
+        blocks = self._blocks_of(sample)
+        if blocks is None:
+            return atlas
+        return filled(atlas, pixels_of(blocks[number], *atlas.shape[:2]))
+
+    def _blocks_of(self, sample: int | None) -> list[NDArray[np.bool_]] | None:
+        """Return the blocks of a sample's maps that are its own; None: all are."""
+        if self._reads is None or sample is None:
+            return None
+        if self._blocks is None or self._blocks[0] != sample:
+            entries = zip(self._reads(sample), self._source.maps, strict=True)
+            found = [blocks_of(texels, entry.size, self._source.projection) for texels, entry in entries]
+            self._blocks = (sample, found)
+        return self._blocks[1]
+
+    def _packed_blocks(self, sample: int) -> bytes:
+        blocks = self._blocks_of(sample)
+        assert blocks is not None
+        return gzip.compress(b"".join(np.packbits(one).tobytes() for one in blocks), 9, mtime=0)
 
     def _texture(self, number: int) -> NDArray[np.uint8]:
         texture = self._source.materials.textures[number]
@@ -215,6 +265,7 @@ class WebPem:
         return {
             "parameter": list(self._source.space.sample(i)),
             "maps": self._map_files(f"samples/{i:05d}"),
+            "blocks": None if self._reads is None else _blocks_name(i),
             "still": _still_name(i) if self._options.stills else None,
             "irradiance": None if self._source.irradiance is None else _irradiance_name(i),
         }
@@ -258,32 +309,12 @@ def _irradiance_name(sample: int) -> str:
     return f"samples/{sample:05d}/irradiance.bin.gz"
 
 
+def _blocks_name(sample: int) -> str:
+    return f"samples/{sample:05d}/blocks.bin.gz"
+
+
 def _still_name(sample: int) -> str:
     return f"samples/{sample:05d}/still"
-
-
-def display_codes(radiance: FloatArray) -> NDArray[np.uint8]:
-    """Scene-linear radiance as the page shows it, 8-bit sRGB after Khronos' neutral tone mapping."""
-    return srgb_codes(neutral_tone_map(radiance))
-
-
-def neutral_tone_map(radiance: FloatArray) -> FloatArray:
-    """Khronos' PBR Neutral tone mapper, (..., 3) to (..., 3) in [0, 1].
-
-    Khronos PBR Neutral Tone Mapper, specification 1.0, 2024.
-    """
-    start, desaturation = 0.8 - 0.04, 0.15
-    colour = np.maximum(radiance.astype(np.float32), 0.0)
-    lowest = colour.min(axis=-1, keepdims=True)
-    offset = np.where(lowest < 0.08, lowest - 6.25 * lowest * lowest, 0.04)
-    colour = colour - offset
-    peak = colour.max(axis=-1, keepdims=True)
-    d = 1.0 - start
-    new_peak = 1.0 - d * d / np.maximum(peak + d - start, 1e-6)
-    g = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0)
-    mapped = colour * new_peak / np.maximum(peak, 1e-6)
-    mapped = mapped * (1.0 - g) + new_peak * g
-    return np.where(peak < start, colour, mapped).astype(np.float32)
 
 
 def _code_of(source: ExportSource) -> RadianceCode:

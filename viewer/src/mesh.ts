@@ -38,6 +38,12 @@ export function gather(payload: Uint8Array, array: MeshArray): ArrayBuffer {
   return result.buffer;
 }
 
+/// Numbers from what each adds to the one before, modulo their range, in place.
+function summed<T extends Uint16Array | Int16Array | Int32Array>(values: T, components: number): T {
+  for (let i = components; i < values.length; ++i) values[i] += values[i - components];
+  return values;
+}
+
 export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Promise<Mesh> {
   let payload: Uint8Array;
   try {
@@ -49,24 +55,18 @@ export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Pro
     throw new UserError("damaged", "The mesh's file is damaged: it has another length than it should.");
   }
   const { positions, indices, normals, uvs, colors, irradiance } = mesh.arrays;
-  const differences = new Int32Array(gather(payload, indices));
-  const result = new Uint32Array(differences.length);
-  let index = 0;
-  for (let i = 0; i < result.length; ++i) {
-    index += differences[i];
-    if (index < 0 || index >= positions.count) {
-      throw new UserError(
-        "damaged",
-        "The mesh's file is damaged: a triangle has a vertex that does not exist.",
-      );
-    }
-    result[i] = index;
+  const result = new Uint32Array(summed(new Int32Array(gather(payload, indices)), 1));
+  if (result.some((index) => index >= positions.count)) {
+    throw new UserError(
+      "damaged",
+      "The mesh's file is damaged: a triangle has a vertex that does not exist.",
+    );
   }
   return {
-    positions: new Uint16Array(gather(payload, positions)),
-    normals: normals ? new Int16Array(gather(payload, normals)) : null,
-    uvs: uvs ? new Uint16Array(gather(payload, uvs)) : null,
-    colors: colors ? new Uint16Array(gather(payload, colors)) : null,
+    positions: summed(new Uint16Array(gather(payload, positions)), 3),
+    normals: normals ? summed(new Int16Array(gather(payload, normals)), 2) : null,
+    uvs: uvs ? summed(new Uint16Array(gather(payload, uvs)), 2) : null,
+    colors: colors ? summed(new Uint16Array(gather(payload, colors)), 3) : null,
     irradiance: irradiance ? new Uint16Array(gather(payload, irradiance)) : null,
     indices: result,
   };

@@ -15,9 +15,6 @@ from mirrorbake.commands.progress import messages, progress
 if TYPE_CHECKING:
     from mirrorbake.bake.bake import ProgressReport
 
-PAGE_QUALITY = 85
-"""Of the page's images: 1 dB less than the default, and a smaller page."""
-
 
 @reports_errors
 def demo_command(
@@ -52,6 +49,6 @@ def _write_page(directory: Path, report: ProgressReport) -> str:
     page = directory / "viewer" / PAGE_NAME
     page.parent.mkdir(exist_ok=True)
     source = export_source(open_pem(directory))
-    options = WebOptions(ImageFormat(exact=False, quality=PAGE_QUALITY), fallback=False)
+    options = WebOptions(ImageFormat(exact=False), fallback=False)
     size = write_single_file(WebPem(source, options), source.title, page, report)
     return f"wrote {page}, {size / 1e6:.2f} MB: open it in a browser"

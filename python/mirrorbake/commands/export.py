@@ -80,6 +80,13 @@ ExactFallback = Annotated[
         help="Of --web: exact images as well, for browsers that show AVIF wrongly; not in a single file."
     ),
 ]
+OnlyRead = Annotated[
+    bool,
+    typer.Option(
+        "--trim/--no-trim",
+        help="Of --web: of a sample only what views near it read, the rest from the static set.",
+    ),
+]
 WithReferences = Annotated[
     bool, typer.Option(help="Of --web: the ray-traced pictures of the samples, to compare with.")
 ]
@@ -104,9 +111,10 @@ def export_command(
     web: WebFolder = None,
     single_file: SingleFile = False,
     exact: ExactImages = False,
-    quality: ImageQuality = 90,
+    quality: ImageQuality = 95,
     fallback: ExactFallback = True,
     references: WithReferences = True,
+    trim: OnlyRead = True,
     threads: Threads = 0,
 ) -> None:
     """Write a PEM for other programs: its maps, a glTF file, a film, pictures, a page that draws it."""
@@ -125,7 +133,7 @@ def export_command(
             from mirrorbake.pem.export.images import ImageFormat
             from mirrorbake.pem.export.web import WebOptions
 
-            options = WebOptions(ImageFormat(exact, quality), fallback and not single_file, references)
+            options = WebOptions(ImageFormat(exact, quality), fallback and not single_file, references, trim)
             _export_page(directory, web, options, single_file)
 
 

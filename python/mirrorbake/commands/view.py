@@ -29,7 +29,7 @@ def view_command(
     from mirrorbake.viewer.server import Content, make_server
 
     source = export_source(open_pem(directory))
-    server = make_server(Content(WebPem(source, WebOptions()), source.title), port)
+    server = make_server(Content(WebPem(source, WebOptions(trim=False)), source.title), port)
     url = f"http://127.0.0.1:{server.server_port}/"
     typer.echo(url)
     messages.print("Ctrl+C ends it", markup=False)

@@ -24,9 +24,8 @@ def blocks_of(texels: NDArray[np.bool_], size: int, projection: Projection) -> N
     height, width = atlas.shape
     whole = np.zeros((-(-height // BLOCK) * BLOCK, -(-width // BLOCK) * BLOCK), np.bool_)
     whole[:height, :width] = atlas
-    found: NDArray[np.bool_] = whole.reshape(
-        whole.shape[0] // BLOCK, BLOCK, whole.shape[1] // BLOCK, BLOCK
-    ).any(axis=(1, 3))
+    parts = whole.reshape(whole.shape[0] // BLOCK, BLOCK, whole.shape[1] // BLOCK, BLOCK)
+    found: NDArray[np.bool_] = np.any(parts, axis=(1, 3))
     return found
 
 

@@ -23,7 +23,7 @@ class ImageFormat:
 
     exact: bool
     """WebP without loss instead of AVIF."""
-    quality: int = 90
+    quality: int = 95
     """Of AVIF, 0 to 100."""
 
     @property

@@ -73,10 +73,7 @@ def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
     indices = renumbered[triangles].ravel()
 
     positions, bounds = _quantised(mesh.positions[used])
-    arrays: dict[str, NDArray[Any]] = {
-        "positions": positions,
-        "indices": np.diff(indices.astype(np.int64), prepend=0).astype(np.int32),
-    }
+    arrays: dict[str, NDArray[Any]] = {"positions": positions, "indices": indices.astype(np.int32)[:, None]}
     description: dict[str, Any] = {"bounds": bounds}
     if len(mesh.normals):
         arrays["normals"] = octahedral(mesh.normals[used])
@@ -87,7 +84,7 @@ def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
         arrays["colors"] = np.rint(np.clip(mesh.colors[used], 0.0, 1.0) * 65535.0).astype(np.uint16)
     if mesh.irradiance is not None:
         arrays["irradiance"] = mesh.irradiance[used].astype(np.float16)
-    payload, layout = _pack(arrays)
+    payload, layout = _pack({name: _differences(array) for name, array in arrays.items()})
     ranges = []
     for part, material in sorted(set(zip(parts.tolist(), materials.tolist(), strict=True))):
         members = np.flatnonzero((parts == part) & (materials == material))
@@ -127,6 +124,16 @@ def _quantised(points: FloatArray) -> tuple[NDArray[np.uint16], dict[str, Any]]:
     extent = np.where(high > low, high - low, 1.0)
     fractions = np.rint((wide - low) / extent * 65535.0).astype(np.uint16)
     return fractions, {"low": low.tolist(), "high": (low + extent).tolist()}
+
+
+def _differences(array: NDArray[Any]) -> NDArray[Any]:
+    """Return integers (n, C) each minus the one before, modulo their range; others as they are."""
+    if array.dtype.kind == "f":
+        return array
+    before = np.zeros_like(array)
+    before[1:] = array[:-1]
+    differences: NDArray[Any] = array - before
+    return differences
 
 
 def _pack(arrays: dict[str, NDArray[Any]]) -> tuple[bytes, dict[str, Any]]:

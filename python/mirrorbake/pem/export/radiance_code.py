@@ -18,8 +18,11 @@ if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.pyramid import Projection
 
-STOPS_BELOW_BRIGHT = 9
-"""Radiance that is told from black, in powers of two below what 99 % of the texels stay below."""
+STOPS_BELOW_BRIGHT = 7
+"""Radiance below which the code is linear, in powers of two below what 99 % of the texels stay below.
+
+With 9, AVIF images of the demonstration take 18 % more bytes for the same picture; with 5, 10 % more.
+"""
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
             triangles=built.triangles,
             parts=built.parts,
             whole_stack=whole,
-            uvs=np.asarray(mesh.uvs),
+            uvs=np.asarray(mesh.uvs) if materials.textures else np.zeros((0, 2), np.float32),
             colors=np.asarray(mesh.colors),
             materials=np.array([numbers.index(number) for number in of_part], np.uint16)[built.parts],
             irradiance=first,

@@ -38,8 +38,13 @@ PROBED_SAMPLES = 16
 """Samples that are read to find the range of the radiance; brighter texels of others are clamped."""
 
 
-STATIC_SET_QUALITY = 25
+STATIC_SET_QUALITY = 35
 """By which the static set's AVIF images are worse: where it shows, it is far from ray tracing by itself."""
+
+
+OTHER_QUALITY = 20
+"""By which α, the captured surroundings and the stills are worse than the radiance of samples: of α a better
+image is not seen, the others are looked at and not looked up."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,7 @@ class WebPem:
         self._add(
             "static/capture",
             lambda: to_atlas(code.encode(source.static), source.static_size, source.projection),
+            _worse(form, OTHER_QUALITY),
         )
         for t in range(len(source.materials.textures)):
             self._add(_texture_name(t), partial(self._texture, t))
@@ -126,17 +132,18 @@ class WebPem:
             self._add_maps(f"samples/{i:05d}", partial(source.pyramid, i), i)
         if options.stills:
             for i in range(len(source.space)):
-                self._add(_still_name(i), partial(self._still, i))
+                self._add(_still_name(i), partial(self._still, i), _worse(form, OTHER_QUALITY))
 
     def _add_maps(self, folder: str, pyramid: Callable[[int], FloatArray], sample: int | None) -> None:
         """Add the images of all maps of a sample, or of the static set."""
         form = self._options.format
         if sample is None:
-            form = replace(form, quality=max(form.quality - STATIC_SET_QUALITY, 1))
+            form = _worse(form, STATIC_SET_QUALITY)
+        grey = _worse(form, OTHER_QUALITY)
         for m, entry in enumerate(self._source.maps):
             self._add(f"{folder}/{m}", partial(self._radiance, pyramid, m, sample), form)
             if not entry.opaque:
-                self._add(f"{folder}/{m}.alpha", partial(self._alpha, pyramid, m, sample), form)
+                self._add(f"{folder}/{m}.alpha", partial(self._alpha, pyramid, m, sample), grey)
 
     def _add(
         self, name: str, pixels: Callable[[], NDArray[np.uint8]], form: ImageFormat | None = None
@@ -275,6 +282,10 @@ class WebPem:
             {"radiance": f"{folder}/{m}", "alpha": None if entry.opaque else f"{folder}/{m}.alpha"}
             for m, entry in enumerate(self._source.maps)
         ]
+
+
+def _worse(form: ImageFormat, by: int) -> ImageFormat:
+    return replace(form, quality=max(form.quality - by, 1))
 
 
 def _material(material: Material) -> dict[str, Any]:

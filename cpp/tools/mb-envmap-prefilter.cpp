@@ -6,6 +6,7 @@
 #include <cctype>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -88,7 +89,7 @@ EnvMap harmonics_as_image(const Harmonics& light, std::span<const std::string> n
 
 class Prefilter final : public Command {
  public:
-  explicit Prefilter(CLI::App* app) : Command(app) {
+  explicit Prefilter(CLI::App* app) : Command(app), given_(app) {
     input_.add_options(*app);
     input_.add_details(*app);
     output_.add_options(*app);
@@ -128,6 +129,7 @@ class Prefilter final : public Command {
         throw InvalidArgument(option->get_name(), "given with --model " + model_, "--model " + model);
       }
     }
+    check_options_of_results();
     if (!split_sum_.empty()) check_envmap_path(split_sum_, {ProjectionKind::angular});
     if (model_ == "sh") {
       run_harmonics(json);
@@ -139,6 +141,29 @@ class Prefilter final : public Command {
   }
 
  private:
+  // What says nothing about what is made is refused, too.
+  void check_options_of_results() const {
+    const auto refuse = [&](std::initializer_list<const char*> names, const char* with,
+                            const char* expected) {
+      for (const char* name : names) {
+        if (given_->count(name) > 0) throw InvalidArgument(name, with, expected);
+      }
+    };
+    if (model_ == "sh") {
+      refuse({"--scale"}, "given with --model sh", "--model irradiance, phong, ggx or table");
+      const bool as_json = has_extension(output_.path, ".json");
+      if (as_json) refuse({"--coefficients", "--layout", "--format"}, "given for a .json file", "an image");
+      if (as_json || coefficients_) {
+        refuse({"--to", "--size", "--keep-negative"}, "given for coefficients", "a map of irradiance");
+      }
+    } else if (model_ == "ggx" && !alpha_) {
+      refuse({"--scale"}, "given for a chain", "--alpha for one lobe");
+    } else if (model_ == "ggx") {
+      refuse({"--levels"}, "given with --alpha", "one of them");
+      if (split_sum_.empty()) refuse({"--linear-roughness"}, "given with --alpha", "one of them");
+    }
+  }
+
   // Options of one model.
   void only(const char* model, CLI::Option* option) { only_.emplace_back(model, option); }
 
@@ -258,6 +283,7 @@ class Prefilter final : public Command {
     return {projection, size.width, size.height};
   }
 
+  const CLI::App* given_;
   Input input_;
   Output output_;
   std::string model_;

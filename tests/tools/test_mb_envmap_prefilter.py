@@ -118,6 +118,11 @@ def test_progress_goes_to_stderr_and_figures_to_stdout(panorama: Path, tmp_path:
         (("irradiance", "--levels", 3), "--levels is given with --model irradiance, expected --model ggx"),
         (("ggx", "--exponent", 3), "--exponent is given with --model ggx, expected --model phong"),
         (("phong", "--coefficients"), "--coefficients is given with --model phong, expected --model sh"),
+        (("sh", "--scale", "sum"), "--scale is given with --model sh"),
+        (("ggx", "--scale", "sum"), "--scale is given for a chain, expected --alpha for one lobe"),
+        (("ggx", "--alpha", 0.5, "--levels", 2), "--levels is given with --alpha, expected one of them"),
+        (("ggx", "--alpha", 0.5, "--linear-roughness"), "--linear-roughness is given with --alpha"),
+        (("sh", "--coefficients"), "--size is given for coefficients, expected a map of irradiance"),
         (("ggx", "--alpha", -0.5), "alpha is -0.5, expected 0.01 to 1"),
         (("ggx", "--alpha", "nan"), "alpha is nan, expected 0.01 to 1"),
     ],
@@ -146,3 +151,20 @@ def test_chain_goes_to_dds_as_half_floats(panorama: Path, tmp_path: Path) -> Non
     loaded = EnvMap.load(tmp_path / "chain.dds")
     expected = ggx_chain(EnvMap.load(panorama), 16, 3)
     np.testing.assert_allclose(loaded.values, expected.values, rtol=2**-11)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--coefficients",), "--coefficients is given for a .json file, expected an image"),
+        (("--format", "half"), "--format is given for a .json file"),
+        (("--keep-negative",), "--keep-negative is given for coefficients"),
+        (("--to", "latlong"), "--to is given for coefficients"),
+    ],
+)
+def test_options_of_images_are_refused_for_json(
+    panorama: Path, tmp_path: Path, arguments: tuple[object, ...], expected: str
+) -> None:
+    out = tmp_path / "out.json"
+    assert expected in run(panorama, "--model", "sh", "-o", out, *arguments, status=2)
+    assert not out.exists()

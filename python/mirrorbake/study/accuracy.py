@@ -19,6 +19,7 @@ from mirrorbake.evaluate.metrics import display_referred, psnr
 from mirrorbake.files import write_text
 from mirrorbake.pem.pyramid import join_pyramid, split_pyramid
 from mirrorbake.study.fresnel import INDICES, rounding
+from mirrorbake.study.lobes import dark_room, lobe_errors, lobes, sunny_sky
 from mirrorbake.study.proxy import proxy_errors
 from mirrorbake.study.trade import maps
 
@@ -53,7 +54,7 @@ def accuracy(cosines: int = 60, rays: int = 6) -> list[Accuracy]:
     rays
         Per shape, flatness and depth of a proxy.
     """
-    return [*_fresnel(cosines), *_proxies(rays), *_projections(), *_display(), *_storage()]
+    return [*_fresnel(cosines), *_proxies(rays), *_projections(), *_prefilter(), *_display(), *_storage()]
 
 
 def _fresnel(cosines: int) -> list[Accuracy]:
@@ -146,6 +147,25 @@ def _projections() -> list[Accuracy]:
 _BOUNDS = {"cube": 2e-7, "dual_paraboloid": 3e-7, "latlong": 3e-7, "angular": 5e-7, "sphere_map": 5e-6}
 
 
+def _prefilter() -> list[Accuracy]:
+    """Of a sun and of lamps; cosine lobes are sums over all texels as they are, others over cells."""
+    rows = []
+    sources = (sunny_sky(128), dark_room(128))
+    for name, (lobe, weight) in lobes().items():
+        if name == "Phong N = 10000":  # narrower than these texels, which it would cut up
+            continue
+        errors = [lobe_errors(source, lobe, weight) for source in sources]
+        exact = name in {"diffuse", "Phong N = 1", "GGX α = 1"}
+        error = max(float(found.max() if exact else np.percentile(found, 99)) for found in errors)
+        unit, bound = ("relative", 1e-6) if exact else ("relative, 99th percentile", 5e-3)
+        rows.append(
+            Accuracy(
+                f"`Prefilter`, {name}", "a sun, lamps of 1e5", "all texels in float64", unit, error, bound
+            )
+        )
+    return rows
+
+
 def _display() -> list[Accuracy]:
     shown = np.linspace(0.0, 1.0, 4096)
     linear = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
@@ -208,8 +228,9 @@ What the numeric functions are off by, over their whole domain: the largest erro
 arguments with the extremes among them. This page is made by
 `python -m mirrorbake.study.accuracy docs/reference/accuracy.md`; a test measures every row again and holds
 it to what is allowed. Curves: [Fresnel reflectance](fresnel.md), [proxy geometry](proxies.md). Errors of
-resampling and of mip levels depend on the map: [environment maps](../guide/environment-maps.md). The light
-of the tracer and of evaluations has noise, which is
+resampling and of mip levels depend on the map: [environment maps](../guide/environment-maps.md); those of
+prefiltered photographs are [with these](../guide/prefiltering.md#what-is-computed). The light of the tracer
+and of evaluations has noise, which is
 [measured with it](../adr/0080-references-apart-from-targets.md).
 
 """

@@ -81,13 +81,13 @@ struct Convolver::State {
                    const std::function<void(std::size_t, std::size_t)>& body) const {
     if (!job.progress) return parallel_for(count, grain, body);
     const int groups = (map.layout.channels + 2) / 3;
-    const int group = job.first_channel / 3;
+    const int made = job.first_channel / 3;
     const std::size_t step = (count / kReports / grain + 1) * grain;
     for (std::size_t at = 0; at < count; at += step) {
       const std::size_t size = std::min(step, count - at);
       parallel_for(size, grain, [&](std::size_t begin, std::size_t end) { body(at + begin, at + end); });
       const double done = static_cast<double>(at + size) / static_cast<double>(count);
-      job.progress((group + done) / groups);
+      job.progress((made + done) / groups);
     }
   }
 

@@ -61,9 +61,13 @@ def run(description: str, cases: Callable[[], Iterable[Case]]) -> None:
     """Command line of a benchmark: a table, or with --json one object per line."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--json", action="store_true", help="print one JSON object per case")
-    as_json = parser.parse_args().json
+    report(cases(), as_json=parser.parse_args().json)
+
+
+def report(cases: Iterable[Case], *, as_json: bool) -> None:
+    """Print cases as they come: a table, or one JSON object per line."""
     table = Table("case", "unit", "mirrorbake", "peer", "peer is", "ratio", "our error", "peer's error")
-    for case in cases():
+    for case in cases:
         if as_json:
             print(json.dumps({**asdict(case), "ratio": case.ratio}), flush=True)
         else:

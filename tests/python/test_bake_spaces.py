@@ -17,6 +17,7 @@ import pytest
 
 from mirrorbake import _core
 from mirrorbake.bake.bake import bake
+from mirrorbake.bake.static_set import static_places
 from mirrorbake.errors import InputError, OptionError, StoreError
 from mirrorbake.evaluate.metrics import psnr
 from mirrorbake.pem.export.images import ImageFormat
@@ -29,6 +30,7 @@ from mirrorbake.pem.store import PemStore
 from mirrorbake.pem.verify import verify
 from mirrorbake.pem.view_images import images_of_trace
 from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.stage import prepare_stage
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -211,7 +213,9 @@ def test_a_bake_that_is_killed_at_any_moment_is_resumed_to_the_same_bits(
     script = f"""
 import json
 from mirrorbake.bake.bake import bake
+from mirrorbake.bake.static_set import static_places
 from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.stage import prepare_stage
 if __name__ == "__main__":
     config = parse_config(json.load(open({str(tmp_path / "scene.json")!r})), "scene")
     bake(config, {str(tmp_path / "killed")!r}, workers={workers!r})
@@ -382,3 +386,20 @@ def test_a_static_set_alone_has_no_parameters(tmp_path: Path) -> None:
     }
     # The view that a PEM keeps lies in the middle of the dome and is none of those that it is inferred from.
     assert drawn["pem"] > drawn["static_infinite"] + 0.75
+
+
+def test_a_third_of_the_views_of_a_static_set_lie_around_the_samples(tmp_path: Path) -> None:
+    dome = {"views": 9, "elevation": [0.0, 60.0]}
+    stage = prepare_stage(scene(tmp_path, {"count": 3, "degrees": 4.0, "start": 20.0}, static=dome))
+    places = static_places(stage)
+    (low, high), (bottom, top) = stage.built.cameras.range()
+    near = [place for place, weight in places if weight == 1.0]
+    far = [place for place, weight in places if weight < 1.0]
+    assert (len(near), len(far)) == (3, 6)
+    for azimuth, elevation in near:
+        assert low - 10.0 <= azimuth <= high + 10.0
+        assert bottom - 10.0 <= elevation <= top + 10.0
+    assert max(azimuth for azimuth, _ in far) - min(azimuth for azimuth, _ in far) > 30.0
+    # Alone it is inferred from all of its directions alike.
+    alone = scene(tmp_path, {"kind": "none", "count": 6, "elevation": [0.0, 60.0]})
+    assert [weight for _, weight in static_places(prepare_stage(alone))] == [1.0] * 6

@@ -55,14 +55,6 @@ void find_free(const Bounds& bounds, const Vector& x, const Vector& s, Vector& f
   });
 }
 
-ChannelSums dot(const Vector& a, const Vector& b) {
-  return parallel_channel_sums(a.size(), [&](std::size_t begin, std::size_t end) {
-    ChannelSums sums{};
-    for (std::size_t i = begin; i < end; ++i) add_product(sums, a[i], b[i]);
-    return sums;
-  });
-}
-
 }  // namespace
 
 std::vector<Vector> rows_of(const std::vector<View>& views) {
@@ -176,11 +168,8 @@ ChannelSums LeastSquares::find_row_scale() const {
   return sums;
 }
 
-void LeastSquares::regularise(const Vector& x, float magnitude, Vector& y) {
-  state_.regulariser.apply(x, magnitude, scratch_, y);
-  parallel_for(y.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) y[i] *= scale_;
-  });
+ChannelSums LeastSquares::regularise(const Vector& x, float magnitude, Vector& y) {
+  return state_.regulariser.apply(x, magnitude, scale_, scratch_, y);
 }
 
 void LeastSquares::gradient(const std::vector<Vector>& t, const Vector& g, Vector& s) {
@@ -285,8 +274,7 @@ void LeastSquares::step_once(float magnitude, Vector& x, Iterate& it) {
   const std::size_t n = x.size();
   multiply(it.step, it.step_rows);
   const ChannelSums data_curvature = weighted_squares(it.step_rows);
-  regularise(it.step, magnitude, it.step_gx);
-  const ChannelSums curvature = dot(it.step, it.step_gx);
+  const ChannelSums curvature = regularise(it.step, magnitude, it.step_gx);
   ChannelSums length{};
   for (std::size_t k = 0; k < 4; ++k) {
     const double total = data_curvature[k] + curvature[k];
@@ -323,9 +311,8 @@ ChannelSums LeastSquares::evaluate(const std::vector<Vector>& target, float magn
       for (std::size_t r = begin; r < end; ++r) it.residual[v][r] = target[v][r] - it.residual[v][r];
     });
   }
-  regularise(x, magnitude, it.gx);
+  const ChannelSums regular = regularise(x, magnitude, it.gx);
   ChannelSums squares = weighted_squares(it.residual);
-  const ChannelSums regular = dot(x, it.gx);
   for (std::size_t k = 0; k < 4; ++k) squares[k] += regular[k];
   return squares;
 }

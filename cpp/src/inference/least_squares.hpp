@@ -78,8 +78,8 @@ class LeastSquares {
                       const Vector& before, const ChannelSums& squares, Vector& x, Iterate& it);
   void add_diagonal(std::size_t view);
   ChannelSums find_row_scale() const;
-  /// y = scale · (G + magnitude) x.
-  void regularise(const Vector& x, float magnitude, Vector& y);
+  /// y = scale · (G + magnitude) x. Returns x·y.
+  ChannelSums regularise(const Vector& x, float magnitude, Vector& y);
   /// s = AᵀW t − g, half the negative gradient.
   void gradient(const std::vector<Vector>& t, const Vector& g, Vector& s);
   /// z = s / diagonal where free is 1, else 0. Returns s·z.

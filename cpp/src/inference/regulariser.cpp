@@ -38,14 +38,17 @@ Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<
       for (std::uint32_t neighbour : links_[i].neighbours)
         d += neighbour != kNoTexel ? options_.smoothness : 0.0F;
       d += options_.level_agreement * 0.25F * child_count(i);
-      if (links_[i].parent != kNoTexel) d += options_.level_agreement * 0.25F / child_count(links_[i].parent);
+      if (links_[i].parent != kNoTexel) {
+        links_[i].siblings = child_count(links_[i].parent);
+        d += options_.level_agreement * 0.25F / links_[i].siblings;
+      }
       diagonal_[i] = d;
     }
   });
 }
 
-void Regulariser::apply(const std::vector<Channels>& x, float magnitude, std::vector<Channels>& scratch,
-                        std::vector<Channels>& y) const {
+ChannelSums Regulariser::apply(const std::vector<Channels>& x, float magnitude, Channels scale,
+                               std::vector<Channels>& scratch, std::vector<Channels>& y) const {
   // First the disagreement of every texel with its children, times ω.
   scratch.resize(x.size());
   parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
@@ -60,7 +63,8 @@ void Regulariser::apply(const std::vector<Channels>& x, float magnitude, std::ve
       scratch[i] = broadcast(0.25F) * (broadcast(count) * x[i] - sum);
     }
   });
-  parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+  return parallel_channel_sums(x.size(), [&](std::size_t begin, std::size_t end) {
+    ChannelSums sums{};
     for (std::size_t i = begin; i < end; ++i) {
       const Links& links = links_[i];
       Channels difference{};
@@ -68,15 +72,13 @@ void Regulariser::apply(const std::vector<Channels>& x, float magnitude, std::ve
         if (neighbour != kNoTexel) difference += x[i] - x[neighbour];
       }
       Channels disagreement = scratch[i];
-      if (links.parent != kNoTexel) {
-        float count = 0.0F;
-        for (std::uint32_t sibling : links_[links.parent].children)
-          count += sibling != kNoTexel ? 1.0F : 0.0F;
-        disagreement -= scratch[links.parent] / broadcast(count);
-      }
-      y[i] = broadcast(options_.smoothness) * difference +
-             broadcast(options_.level_agreement) * disagreement + broadcast(magnitude) * x[i];
+      if (links.parent != kNoTexel) disagreement -= scratch[links.parent] / broadcast(links.siblings);
+      y[i] = (broadcast(options_.smoothness) * difference +
+              broadcast(options_.level_agreement) * disagreement + broadcast(magnitude) * x[i]) *
+             scale;
+      add_product(sums, x[i], y[i]);
     }
+    return sums;
   });
 }
 

@@ -21,9 +21,9 @@ class Regulariser {
   Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
               std::size_t numbers, const SolveOptions& options);
 
-  /// y = (G + magnitude · 1) x, where the form is xᵀ G x. `scratch` is memory to work in.
-  void apply(const std::vector<Channels>& x, float magnitude, std::vector<Channels>& scratch,
-             std::vector<Channels>& y) const;
+  /// y = scale (G + magnitude · 1) x, where the form is xᵀ G x; returns x·y. `scratch` is memory to work in.
+  ChannelSums apply(const std::vector<Channels>& x, float magnitude, Channels scale,
+                    std::vector<Channels>& scratch, std::vector<Channels>& y) const;
 
   /// Diagonal entry of G.
   float diagonal(std::size_t number) const { return diagonal_[number]; }
@@ -33,6 +33,7 @@ class Regulariser {
     std::array<std::uint32_t, 4> neighbours;
     std::array<std::uint32_t, 4> children;
     std::uint32_t parent;
+    float siblings;  // children of the parent that have a number
   };
   SolveOptions options_;
   std::vector<Links> links_;

@@ -31,8 +31,8 @@ class Quality:
 
 QUALITIES: Mapping[str, Quality] = {
     "draft": Quality(noise=0.0, passes=1, neighbours=0.0, traced=0, static=0),
-    "normal": Quality(noise=0.01, passes=2, neighbours=0.3, traced=1, static=32),
-    "high": Quality(noise=0.005, passes=2, neighbours=0.3, traced=2, static=64),
+    "normal": Quality(noise=0.01, passes=2, neighbours=0.3, traced=1, static=64),
+    "high": Quality(noise=0.005, passes=2, neighbours=0.3, traced=2, static=128),
 }
 
 NEAR_DEGREES = 3.0

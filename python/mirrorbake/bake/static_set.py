@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +27,17 @@ ROWS = 8
 PIXELS = 24 << 16
 """Of all views of a static set, about: of more, stripes are left out. Views add more than pixels do."""
 
+NEAR_DEGREES = 10.0
+"""Around the samples: there is a part of the views of a static set beside them, since most of what a PEM fades
+to it is seen from there."""
+NEAR_SHARE = 3
+"""One view in so many is there."""
+FAR_WEIGHT = 0.3
+"""Of the pixels of the others, which are spread over the whole dome."""
+
 Range = tuple[float, float]
+Place = tuple[float, float]
+"""Azimuth and elevation, degrees."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +63,13 @@ class Dome:
         elevation = (min(config.static.elevation[0], bottom), max(config.static.elevation[1], top))
         return Dome(config.static.views, (middle - around, middle + around), elevation)
 
-    def places(self) -> list[tuple[float, float]]:
+    @staticmethod
+    def near(stage: Stage) -> Dome:
+        """Return the part of the dome that is around a planned scene's samples, with a third of its views."""
+        whole, (azimuth, elevation) = Dome.of(stage), stage.built.cameras.range()
+        return Dome(whole.count // NEAR_SHARE, _widened(azimuth, whole.azimuth), _widened(elevation, whole.elevation))
+
+    def places(self) -> list[Place]:
         """Return azimuths and elevations, evenly spread over the solid angle.
 
         By powers of the plastic number: M. Roberts, The unreasonable effectiveness of quasirandom sequences,
@@ -68,8 +84,34 @@ class Dome:
         return list(zip(azimuth.tolist(), elevation.tolist(), strict=True))
 
 
+def _widened(samples: Range, limits: Range) -> Range:
+    low, high = min(samples), max(samples)
+    return max(low - NEAR_DEGREES, limits[0]), min(high + NEAR_DEGREES, limits[1])
+
+
+def static_places(stage: Stage) -> list[tuple[Place, float]]:
+    """Return from where a static set is inferred, and the weights of these views.
+
+    Without samples beside it all directions of the dome count alike.
+    """
+    near, whole = Dome.near(stage), Dome.of(stage)
+    everywhere = (near.azimuth, near.elevation) == (whole.azimuth, whole.elevation)
+    if everywhere or stage.config.views.kind == "none":
+        return [(place, 1.0) for place in whole.places()]
+    far = replace(whole, count=whole.count - near.count)
+    return [
+        *((place, 1.0) for place in near.places()),
+        *((place, FAR_WEIGHT) for place in far.places()),
+    ]
+
+
 def stripes_of(
-    tracer: ViewTracer, stage: Stage, camera: _core.Camera, step: int, phase: int
+    tracer: ViewTracer,
+    stage: Stage,
+    camera: _core.Camera,
+    step: int,
+    phase: int,
+    weight: float = 1.0,
 ) -> list[FitView]:
     """Return every so-manieth stripe of a view that sees the object."""
     views = []
@@ -77,21 +119,21 @@ def stripes_of(
         y = number * ROWS
         view = tracer.stripe(stage, camera, (0, y, camera.width, min(ROWS, camera.height - y)))
         if view is not None:
-            views.append(FitView(view))
+            views.append(FitView(view, weight=weight))
     return views
 
 
 def static_views(
     tracer: ViewTracer, stage: Stage, report: Callable[[int, int, str], None] = lambda done, total, text: None
 ) -> list[FitView]:
-    """Return what a static set is fitted to: stripes of views from all over its dome."""
-    cameras, places = stage.built.cameras, Dome.of(stage).places()
+    """Return what a static set is fitted to: stripes of views from its dome."""
+    cameras, places = stage.built.cameras, static_places(stage)
     width, height = cameras.size
     step = max(1, math.ceil(len(places) * width * height / PIXELS))
     views: list[FitView] = []
-    for number, place in enumerate(places):
+    for number, (place, weight) in enumerate(places):
         report(number, len(places), f"view {number + 1} of {len(places)} for the static set")
-        views += stripes_of(tracer, stage, cameras.around(*place), step, number % step)
+        views += stripes_of(tracer, stage, cameras.around(*place), step, number % step, weight)
     return views
 
 

@@ -116,14 +116,16 @@ void LeastSquares::multiply(const Vector& x, std::vector<Vector>& b) {
 void LeastSquares::add_transposed(const std::vector<Vector>& t, Vector& y) {
   for (std::size_t v = 0; v < state_.views.size(); ++v) {
     const View& view = state_.views[v];
-    const Vector& w = weights_[v];
-    const Vector& residual = t[v];
+    // Once a row, not once an entry.
+    weighted_.resize(t[v].size());
+    parallel_for(t[v].size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) weighted_[r] = weights_[v][r] * t[v][r];
+    });
     parallel_for(view.texels.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t j = begin; j < end; ++j) {
         Channels sum{};
         for (std::uint64_t e = view.column_offsets[j]; e < view.column_offsets[j + 1]; ++e) {
-          const std::uint32_t row = view.rows[e];
-          sum += broadcast(view.entries[e]) * (w[row] * residual[row]);
+          sum += broadcast(view.entries[e]) * weighted_[view.rows[e]];
         }
         for (std::size_t n = 0; n < view.nodes.size(); ++n) {
           y[view.unknowns[n][j]] += broadcast(view.nodes[n].weight) * sum;
@@ -137,9 +139,9 @@ ChannelSums LeastSquares::weighted_squares(const std::vector<Vector>& t) const {
   ChannelSums sums{};
   for (std::size_t v = 0; v < t.size(); ++v) {
     const ChannelSums of_view = parallel_channel_sums(t[v].size(), [&](std::size_t begin, std::size_t end) {
-      ChannelSums part{};
+      ChannelDoubles part{};
       for (std::size_t r = begin; r < end; ++r) add_product(part, weights_[v][r] * t[v][r], t[v][r]);
-      return part;
+      return to_sums(part);
     });
     for (std::size_t k = 0; k < 4; ++k) sums[k] += of_view[k];
   }
@@ -179,18 +181,21 @@ void LeastSquares::gradient(const std::vector<Vector>& t, const Vector& g, Vecto
   add_transposed(t, s);
 }
 
-ChannelSums LeastSquares::precondition(float magnitude, const Vector& free, const Vector& s,
-                                       Vector& z) const {
-  return parallel_channel_sums(s.size(), [&](std::size_t begin, std::size_t end) {
-    ChannelSums sums{};
+void LeastSquares::find_preconditioner(float magnitude, const Vector& free, Vector& inverse) const {
+  parallel_for(free.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Channels diagonal = diagonal_[i] + broadcast(state_.regulariser.diagonal(i) + magnitude) * scale_;
-      for (std::size_t k = 0; k < 4; ++k) {
-        z[i][k] = diagonal[k] > 0.0F ? free[i][k] * s[i][k] / diagonal[k] : 0.0F;
-      }
-      add_product(sums, s[i], z[i]);
+      for (std::size_t k = 0; k < 4; ++k)
+        inverse[i][k] = diagonal[k] > 0.0F ? free[i][k] / diagonal[k] : 0.0F;
     }
-    return sums;
+  });
+}
+
+ChannelSums LeastSquares::preconditioned_squares(const Vector& inverse, const Vector& s) {
+  return parallel_channel_sums(s.size(), [&](std::size_t begin, std::size_t end) {
+    ChannelDoubles sums{};
+    for (std::size_t i = begin; i < end; ++i) add_product(sums, s[i], inverse[i] * s[i]);
+    return to_sums(sums);
   });
 }
 
@@ -219,7 +224,8 @@ SolveReport LeastSquares::minimise(const std::vector<Vector>& target, float magn
              Vector(n)};
   std::fill(it.free.begin(), it.free.end(), broadcast(1.0F));
   gradient(target, it.gx, it.s);
-  it.gamma = precondition(magnitude, it.free, it.s, it.z);
+  find_preconditioner(magnitude, it.free, it.inverse);
+  it.gamma = preconditioned_squares(it.inverse, it.s);
   const ChannelSums start = it.gamma;
   const auto relative_gradient = [&] {
     double worst = 0;
@@ -242,7 +248,8 @@ SolveReport LeastSquares::minimise(const std::vector<Vector>& target, float magn
   while (true) {
     gradient(it.residual, it.gx, it.s);
     find_free(bounds, x, it.s, it.free);
-    it.gamma = precondition(magnitude, it.free, it.s, it.z);
+    find_preconditioner(magnitude, it.free, it.inverse);
+    it.gamma = preconditioned_squares(it.inverse, it.s);
     report.relative_gradient = relative_gradient();
     if (!std::isfinite(report.relative_gradient)) throw NumericalError("conjugate gradients diverged");
     report.converged = report.relative_gradient <= tolerance;
@@ -256,7 +263,9 @@ SolveReport LeastSquares::minimise(const std::vector<Vector>& target, float magn
     }
     ++report.rounds;
     before = x;
-    it.step = it.z;
+    parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t j = begin; j < end; ++j) it.step[j] = it.inverse[j] * it.s[j];
+    });
     for (int i = 0; i < static_cast<int>(length) && report.iterations < state_.options.max_iterations; ++i) {
       step_once(magnitude, x, it);
       ++report.iterations;
@@ -285,6 +294,7 @@ void LeastSquares::step_once(float magnitude, Vector& x, Iterate& it) {
     for (std::size_t j = begin; j < end; ++j) {
       x[j] += a * it.step[j];
       it.gx[j] += a * it.step_gx[j];
+      it.s[j] = -it.gx[j];
     }
   });
   for (std::size_t v = 0; v < it.residual.size(); ++v) {
@@ -292,14 +302,14 @@ void LeastSquares::step_once(float magnitude, Vector& x, Iterate& it) {
       for (std::size_t r = begin; r < end; ++r) it.residual[v][r] -= a * it.step_rows[v][r];
     });
   }
-  gradient(it.residual, it.gx, it.s);
-  const ChannelSums next = precondition(magnitude, it.free, it.s, it.z);
+  add_transposed(it.residual, it.s);
+  const ChannelSums next = preconditioned_squares(it.inverse, it.s);
   ChannelSums ratio{};
   for (std::size_t k = 0; k < 4; ++k) ratio[k] = it.gamma[k] > 0 ? next[k] / it.gamma[k] : 0;
   it.gamma = next;
   const Channels b = to_channels(ratio);
   parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t j = begin; j < end; ++j) it.step[j] = it.z[j] + b * it.step[j];
+    for (std::size_t j = begin; j < end; ++j) it.step[j] = it.inverse[j] * it.s[j] + b * it.step[j];
   });
 }
 

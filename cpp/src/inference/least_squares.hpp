@@ -67,7 +67,7 @@ class LeastSquares {
   /// What conjugate gradients carry along.
   struct Iterate {
     std::vector<Vector> residual, step_rows;
-    Vector gx, step_gx, s, z, step, free;
+    Vector gx, step_gx, s, step, free, inverse;
     ChannelSums gamma{};
   };
 
@@ -82,12 +82,14 @@ class LeastSquares {
   ChannelSums regularise(const Vector& x, float magnitude, Vector& y);
   /// s = AᵀW t − g, half the negative gradient.
   void gradient(const std::vector<Vector>& t, const Vector& g, Vector& s);
-  /// z = s / diagonal where free is 1, else 0. Returns s·z.
-  ChannelSums precondition(float magnitude, const Vector& free, const Vector& s, Vector& z) const;
+  /// 1 / diagonal where free is 1, else 0.
+  void find_preconditioner(float magnitude, const Vector& free, Vector& inverse) const;
+  /// s·(inverse s).
+  static ChannelSums preconditioned_squares(const Vector& inverse, const Vector& s);
 
   const MapSolver::State& state_;
   std::vector<Vector> weights_;
-  Vector blended_, diagonal_, scratch_;
+  Vector blended_, weighted_, diagonal_, scratch_;
   ChannelSums row_scale_{};
   Channels scale_{};
 };

@@ -5,6 +5,7 @@ namespace mirrorbake {
 Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
                          std::size_t numbers, const SolveOptions& options)
     : options_(options), links_(numbers), diagonal_(numbers) {
+  std::vector<std::array<std::uint32_t, 4>> children(numbers);
   for (std::size_t first = 0; first < number_of.size();) {
     for (const TexelTopology& map : maps) {
       const auto number = [&](std::uint32_t texel) {
@@ -16,10 +17,10 @@ Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<
           const std::uint32_t i = number(texel);
           if (i == kNoTexel) continue;
           const auto neighbours = map.neighbours(texel);
-          const auto children = map.children(texel);
+          const auto below = map.children(texel);
           for (std::size_t k = 0; k < 4; ++k) {
             links_[i].neighbours[k] = number(neighbours[k]);
-            links_[i].children[k] = number(children[k]);
+            children[i][k] = number(below[k]);
           }
           links_[i].parent = number(map.parent(texel));
         }
@@ -27,11 +28,15 @@ Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<
       first += map.texels();
     }
   }
-  const auto child_count = [this](std::size_t i) {
+  const auto child_count = [&](std::size_t i) {
     int count = 0;
-    for (std::uint32_t child : links_[i].children) count += child != kNoTexel;
+    for (std::uint32_t child : children[i]) count += child != kNoTexel;
     return static_cast<float>(count);
   };
+  for (std::size_t i = 0; i < numbers; ++i) {
+    const float count = child_count(i);
+    if (count > 0.0F) parents_.push_back({static_cast<std::uint32_t>(i), count, children[i]});
+  }
   parallel_for(numbers, kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       float d = 0.0F;
@@ -49,22 +54,20 @@ Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<
 
 ChannelSums Regulariser::apply(const std::vector<Channels>& x, float magnitude, Channels scale,
                                std::vector<Channels>& scratch, std::vector<Channels>& y) const {
-  // First the disagreement of every texel with its children, times ω.
+  // First the disagreement of every texel with its children, times ω. Most have none: theirs stays 0.
   scratch.resize(x.size());
-  parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
+  parallel_for(parents_.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      const Parent& parent = parents_[p];
       Channels sum{};
-      float count = 0.0F;
-      for (std::uint32_t child : links_[i].children) {
-        if (child == kNoTexel) continue;
-        sum += x[child];
-        count += 1.0F;
+      for (std::uint32_t child : parent.children) {
+        if (child != kNoTexel) sum += x[child];
       }
-      scratch[i] = broadcast(0.25F) * (broadcast(count) * x[i] - sum);
+      scratch[parent.number] = broadcast(0.25F) * (broadcast(parent.count) * x[parent.number] - sum);
     }
   });
   return parallel_channel_sums(x.size(), [&](std::size_t begin, std::size_t end) {
-    ChannelSums sums{};
+    ChannelDoubles sums{};
     for (std::size_t i = begin; i < end; ++i) {
       const Links& links = links_[i];
       Channels difference{};
@@ -78,7 +81,7 @@ ChannelSums Regulariser::apply(const std::vector<Channels>& x, float magnitude, 
              scale;
       add_product(sums, x[i], y[i]);
     }
-    return sums;
+    return to_sums(sums);
   });
 }
 

@@ -31,12 +31,18 @@ class Regulariser {
  private:
   struct Links {
     std::array<std::uint32_t, 4> neighbours;
-    std::array<std::uint32_t, 4> children;
     std::uint32_t parent;
     float siblings;  // children of the parent that have a number
   };
+  /// A texel that has children, and how many of them have a number.
+  struct Parent {
+    std::uint32_t number;
+    float count;
+    std::array<std::uint32_t, 4> children;
+  };
   SolveOptions options_;
   std::vector<Links> links_;
+  std::vector<Parent> parents_;
   std::vector<float> diagonal_;
 };
 

@@ -12,6 +12,8 @@ namespace mirrorbake {
 /// The channels of one texel or pixel, in one SIMD register; maps of fewer channels leave the rest zero.
 using Channels = float __attribute__((vector_size(16)));
 using ChannelSums = std::array<double, 4>;
+/// Of sums that are being made, in SIMD registers too.
+using ChannelDoubles = double __attribute__((vector_size(32)));
 
 inline constexpr std::size_t kVectorGrain = 8192;
 
@@ -30,9 +32,11 @@ ChannelSums parallel_channel_sums(std::size_t count, const Body& body) {
   return sums;
 }
 
-inline void add_product(ChannelSums& sums, Channels a, Channels b) {
-  for (std::size_t k = 0; k < 4; ++k) sums[k] += static_cast<double>(a[k]) * static_cast<double>(b[k]);
+inline void add_product(ChannelDoubles& sums, Channels a, Channels b) {
+  sums += __builtin_convertvector(a, ChannelDoubles) * __builtin_convertvector(b, ChannelDoubles);
 }
+
+inline ChannelSums to_sums(const ChannelDoubles& sums) { return {sums[0], sums[1], sums[2], sums[3]}; }
 
 inline std::vector<Channels> widen(std::span<const float> values, int channels) {
   const std::size_t c = static_cast<std::size_t>(channels);

@@ -28,8 +28,8 @@ PIXELS = 24 << 16
 """Of all views of a static set, about: of more, stripes are left out. Views add more than pixels do."""
 
 NEAR_DEGREES = 10.0
-"""Around the samples: there is a part of the views of a static set beside them, since most of what a PEM fades
-to it is seen from there."""
+"""Around the samples: there is a part of the views of a static set beside them, since most of what a PEM
+fades to it is seen from there."""
 NEAR_SHARE = 3
 """One view in so many is there."""
 FAR_WEIGHT = 0.3
@@ -67,7 +67,9 @@ class Dome:
     def near(stage: Stage) -> Dome:
         """Return the part of the dome that is around a planned scene's samples, with a third of its views."""
         whole, (azimuth, elevation) = Dome.of(stage), stage.built.cameras.range()
-        return Dome(whole.count // NEAR_SHARE, _widened(azimuth, whole.azimuth), _widened(elevation, whole.elevation))
+        return Dome(
+            whole.count // NEAR_SHARE, _widened(azimuth, whole.azimuth), _widened(elevation, whole.elevation)
+        )
 
     def places(self) -> list[Place]:
         """Return azimuths and elevations, evenly spread over the solid angle.

@@ -24,7 +24,7 @@ glm::dmat3 rotation_of(const char* option, const std::vector<double>& look, doub
   const glm::dvec3 given(look[0], look[1], look[2]);
   const double length = glm::length(given);
   if (!std::isfinite(length) || !(length > 0.0)) {
-    throw InvalidArgument(option, json_list(look), "three finite numbers that are not all 0");
+    throw InvalidArgument(option, text_of(given), "three finite numbers that are not all 0");
   }
   if (!std::isfinite(roll)) throw InvalidArgument("--roll", text_of(roll), "finite degrees");
   const glm::dvec3 back = -given / length;

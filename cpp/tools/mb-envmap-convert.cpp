@@ -71,7 +71,7 @@ struct Conversion {
   glm::mat3 rotation() const {
     const glm::vec3 given(axis[0], axis[1], axis[2]);
     if (!std::isfinite(glm::length(given)) || !(glm::length(given) > 0.0F)) {
-      throw InvalidArgument("--axis", json_list(axis), "three finite numbers that are not all 0");
+      throw InvalidArgument("--axis", text_of(given), "three finite numbers that are not all 0");
     }
     if (!std::isfinite(turn)) throw InvalidArgument("--turn", text_of(turn), "finite degrees");
     const glm::dvec3 a = glm::normalize(glm::dvec3(given));

@@ -125,7 +125,7 @@ def test_turning_about_another_axis_and_exposure(tmp_path: Path) -> None:
     assert turned.sample([0.0, -1.0, 0.0])[0] == pytest.approx(8, rel=0.05)
     assert turned.sample([0.0, 0.0, -1.0])[0] < 0.1
     nowhere = (*arguments[:6], "--axis", 0, 0, 0, "-o", tmp_path / "no.exr")
-    assert "--axis is [0, 0, 0]" in mb_envmap("convert", tmp_path / "in.exr", *nowhere, status=2)
+    assert "--axis is (0, 0, 0)" in mb_envmap("convert", tmp_path / "in.exr", *nowhere, status=2)
 
 
 def test_mips_border_and_sample(panorama: Path, tmp_path: Path) -> None:

@@ -40,6 +40,7 @@ from mirrorbake.evaluate.single_maps import (
 from mirrorbake.evaluate.table import metrics_tables
 from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.scene.cameras import Cameras
+from mirrorbake.scene.config_axes import SCENE_AXES
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.parameters import Axis, ParameterSpace
 from mirrorbake.scene.stage import Stage, prepare_stage
@@ -180,6 +181,11 @@ def test_references_are_kept_under_all_that_decides_their_light(baked: Baked, tm
     changed = type(header.source)(header.source.library, config, header.source.inputs)
     names.add(ReferenceCache(tmp_path, changed, header.plan.depth).path(camera, window))
     assert len(names) == 5
+    for axis in SCENE_AXES:
+        config = {**header.source.config, axis: {"turn": 12.5}}
+        changed = type(header.source)(header.source.library, config, header.source.inputs)
+        names.add(ReferenceCache(tmp_path, changed, header.plan.depth).path(camera, window))
+    assert len(names) == 5 + len(SCENE_AXES)
     # What is inferred from the light does not change it: studies share references.
     config = json.loads(json.dumps(header.source.config))
     config["infer"]["smoothness"], config["maps"]["size"] = 0.5, 8

@@ -11,7 +11,7 @@ from mirrorbake import _core
 from mirrorbake.bake.static_set import stripes_of
 from mirrorbake.bake.targets import ViewTracer
 from mirrorbake.pem.run_time import fade_weight, model_of, shell_maps
-from mirrorbake.scene.pose import Pose
+from mirrorbake.scene.pose import AT_REST
 from mirrorbake.tone import srgb_encoded
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def _held_out(
 ) -> Iterator[tuple[float, FloatArray, FloatArray, NDArray[np.float64]]]:
     """Yield degrees beyond, the pixels of a sample and of the static set, and true displayed ones."""
     header, cameras = contents.header, stage.built.cameras
-    tracer, model, pose = ViewTracer(stage, header), model_of(header.run_time), Pose.of(stage.config, 0.0)
+    tracer, model, pose = ViewTracer(stage, header), model_of(header.run_time), AT_REST
     static_maps = contents.static_maps
     assert static_maps is not None
 

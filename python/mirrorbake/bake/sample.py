@@ -16,8 +16,8 @@ from mirrorbake.bake.targets import ViewTracer
 from mirrorbake.pem.run_time import lookups_of
 from mirrorbake.pem.store import SolverReport, Timings
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
+from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.neighbourhood import beside, block, views_around
-from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.store import Contents
     from mirrorbake.scene.parameters import Point
+    from mirrorbake.scene.pose import Pose
     from mirrorbake.scene.stage import Stage
 
     Maps = dict[tuple[str, str], FloatArray]
@@ -75,7 +76,7 @@ class SampleBaker:
                 stage.built.reflector, DIFFUSE_RAYS, stage.config.trace.seed
             )
         captured = captured_pyramids(stage, self._header) if stage.place else self._captured
-        pose = Pose.of(self._stage.config, self._header.space.scene_coordinates(point).get("motion", 0.0))
+        pose = arranged(self._stage.config, self._header.space.scene_coordinates(point)).pose
         if self._infer.fit == "display":
             return self._fit_display(index, stage, pose, captured, irradiance, start)
         return self._fit_layers(point, pose, captured, irradiance, start)

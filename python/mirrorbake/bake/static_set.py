@@ -12,7 +12,7 @@ from mirrorbake.bake.captured import captured_pyramids
 from mirrorbake.bake.fit import DisplayFitter, FitView
 from mirrorbake.bake.targets import ViewTracer
 from mirrorbake.pem.layout import read_back, stored_map
-from mirrorbake.scene.pose import Pose
+from mirrorbake.scene.pose import AT_REST
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -165,6 +165,6 @@ def infer_static_set(
     prior = None
     if stage.config.infer.prior == "captured":
         prior = fitter.captured_prior(captured_pyramids(stage, header, contents.capture))
-    texels, solver = fitter.fit(views, Pose.of(stage.config, 0.0), prior)
+    texels, solver = fitter.fit(views, AT_REST, prior)
     stored = [read_back(stored_map(pyramid, header)[0], header) for pyramid in texels[0]]
     return np.stack(stored), solver

@@ -16,6 +16,7 @@ from mirrorbake import _core
 from mirrorbake.evaluate.metrics import decibels, mean_squared_error
 from mirrorbake.files import atomic_output
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
+from mirrorbake.scene.config_axes import SCENE_AXES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -41,7 +42,7 @@ SEED_OFFSET = 0x5EED_0000
 """Keeps seeds of references apart from those of targets: samples lie elsewhere in the pixels."""
 WINDOW_MARGIN = 6
 """Pixels around the object that are traced, too: metrics of structure look around a pixel."""
-_LIGHT_SECTIONS = ("reflector", "material", "surroundings", "motion", "light")
+_LIGHT_SECTIONS = ("reflector", "material", "surroundings", *SCENE_AXES)
 _LIGHT_KEYS = ("seed", "indirect", "cache_rays")
 
 
@@ -208,7 +209,7 @@ class ReferenceCache:
     def __init__(self, folder: Path, source: Source, depth: int) -> None:
         self._folder = folder
         config: Mapping[str, Any] = source.config
-        content = {section: config[section] for section in _LIGHT_SECTIONS}
+        content = {section: config.get(section) for section in _LIGHT_SECTIONS}
         # The content of a file counts, not its name.
         files = {key: {**value, "path": None} for key, value in source.inputs.items()}
         for key in files:

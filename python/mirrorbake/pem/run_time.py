@@ -11,8 +11,8 @@ from mirrorbake import _core
 from mirrorbake.errors import StoreError
 from mirrorbake.pem.pyramid import pyramid_of
 from mirrorbake.proxy import proxy_from_attributes
+from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.load import parse_config
-from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from mirrorbake.pem.header import Header
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.parameters import PointLike
+    from mirrorbake.scene.pose import Pose
 
 
 def blended(shares: Sequence[tuple[FloatArray, float]]) -> FloatArray:
@@ -236,7 +237,7 @@ class RunTime:
 
     def _pose_at(self, point: PointLike) -> Pose:
         space = self._header.space
-        return Pose.of(self._config, space.scene_coordinates(space.point(point)).get("motion", 0.0))
+        return arranged(self._config, space.scene_coordinates(space.point(point))).pose
 
     def _irradiance_at(self, point: PointLike) -> FloatArray | None:
         if self.store.has_irradiance_per_sample and self._irradiance is not None:

@@ -10,9 +10,9 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.errors import InputError
 from mirrorbake.scene.cameras import Cameras, resolve_cameras
+from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.origin import Origin, loaded_nearby
 from mirrorbake.scene.parameters import ParameterSpace, Point, format_point, space_of
-from mirrorbake.scene.pose import Pose
 from mirrorbake.scene.reflector import add_reflector, named_object
 from mirrorbake.scene.shell_rules import trace_rules
 
@@ -55,7 +55,7 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     config
         The scene file.
     point
-        Of the parameter space: where the object has moved to and the light has turned. None: at rest.
+        Of the parameter space, whose coordinates change the scene. None: at rest.
 
     Raises
     ------
@@ -68,12 +68,9 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     """
     space = space_of(config)
     place = {} if point is None else space.scene_coordinates(point)
-    surroundings = config.surroundings
-    if config.light is not None:
-        turned = surroundings.rotation + place.get("light", 0.0) * config.light.turn
-        surroundings = surroundings.model_copy(update={"rotation": turned})
-    scene, notes, origin = _surroundings(config, surroundings)
-    pose = Pose.of(config, place.get("motion", 0.0))
+    arrangement = arranged(config, place)
+    config, pose = arrangement.config, arrangement.pose
+    scene, notes, origin = _surroundings(config)
     reflector, more_notes = add_reflector(config, scene, pose)
     notes += more_notes
     if config.shells is not None:
@@ -110,12 +107,12 @@ def _vector(v: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{x:.7g}" for x in v) + ")"
 
 
-def _surroundings(config: SceneConfig, surroundings: Surroundings) -> tuple[_core.Scene, list[str], Origin]:
+def _surroundings(config: SceneConfig) -> tuple[_core.Scene, list[str], Origin]:
     """Return the surroundings, what the user should know of them, and where their zero is.
 
     That is where the object stands; one that a file places is asked for its own position.
     """
-    origin = config.reflector.position
+    surroundings, origin = config.surroundings, config.reflector.position
     if surroundings.room is not None:
         scene = _core.make_room()
         if any(origin):

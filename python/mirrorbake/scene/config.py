@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from mirrorbake import _core
+from mirrorbake.scene.config_axes import SCENE_AXES, Light, Motion, scene_axes
 from mirrorbake.scene.config_shells import Shells, ShellSection, check_shells
 from mirrorbake.scene.config_values import (
     AUTO,
@@ -24,7 +25,7 @@ from mirrorbake.scene.config_values import (
     as_tuple,
     with_default,
 )
-from mirrorbake.scene.config_views import Elevation, Light, Motion, Views
+from mirrorbake.scene.config_views import Elevation, Views
 
 ILLUMINANT: Final = "D65"
 """Under which the colours of metals are meant: the white of Rec.709."""
@@ -344,8 +345,6 @@ class SceneConfig(Section):
     def _sections_fit_each_other(self) -> SceneConfig:
         if self.reflector.scene_object is not None and self.surroundings.scene is None:
             raise ValueError("reflector.scene_object needs surroundings.scene, the file that it is in")
-        if self.reflector.scene_object is not None and self.motion is not None:
-            raise ValueError("[motion] has no meaning for reflector.scene_object, which stays where it is")
         if self.shells is not None:
             check_shells(self.shells)
             if self.layers.local is not None:
@@ -354,8 +353,8 @@ class SceneConfig(Section):
                 raise ValueError(
                     f"maps.distant and the proxy of {self.shells[-1].name!r} are one; give either"
                 )
-        if self.light is not None and self.surroundings.panorama is None:
-            raise ValueError("[light] needs surroundings.panorama, the light that it turns")
+        for axis in scene_axes(self).values():
+            axis.check(self)
         return self
 
 
@@ -373,8 +372,7 @@ SECTIONS: Mapping[str, type[Section]] = {
     "surroundings": Surroundings,
     "ground": Ground,
     "views": Views,
-    "motion": Motion,
-    "light": Light,
+    **SCENE_AXES,
     "layers": Layers,
     "shells": ShellSection,
     "maps": Maps,

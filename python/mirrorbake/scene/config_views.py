@@ -1,4 +1,4 @@
-"""The sections of a scene file that span the parameter space: [views], [motion] and [light]."""
+"""[views] of a scene file: the cameras, and the axes of the parameter space along which they move."""
 
 from __future__ import annotations
 
@@ -79,29 +79,3 @@ class Views(Section):
         if self.elevation[0] > self.elevation[1]:
             raise ValueError(f"elevation = {list(self.elevation)}: expected the lower one first")
         return self
-
-
-class Motion(Section):
-    """[motion]: an axis of the parameter space along which the object moves, from 0 to 1."""
-
-    count: Annotated[int, Field(ge=1, le=100_000)] = 5
-    """Maps along the axis."""
-    to: Vec3 = (0.0, 0.0, 0.0)
-    """How far the object has moved at 1, in metres."""
-    turn: Annotated[float, Field(ge=-3600, le=3600)] = 0.0
-    """How far it has turned about the vertical through the centre of its base at 1, in degrees."""
-
-    @model_validator(mode="after")
-    def _moves(self) -> Motion:
-        if not any(self.to) and not self.turn:
-            raise ValueError("give `to` or `turn`: the object does not move")
-        return self
-
-
-class Light(Section):
-    """[light]: an axis of the parameter space along which the panorama turns, from 0 to 1."""
-
-    count: Annotated[int, Field(ge=1, le=100_000)] = 5
-    """Maps along the axis."""
-    turn: Annotated[float, Field(ge=-3600, le=3600)] = 90.0
-    """Of the panorama at 1, in degrees, counter-clockwise about +Y seen from above."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from mirrorbake.errors import OptionError
+from mirrorbake.scene.config_axes import scene_axes
 
 if TYPE_CHECKING:
     from mirrorbake.scene.config import SceneConfig
@@ -27,8 +28,12 @@ Point: TypeAlias = tuple[float, ...]
 PointLike: TypeAlias = float | Sequence[float]
 """A point; a number alone stands for a point of a space of one axis."""
 
-CAMERA_AXES = ("arc", "azimuth", "elevation")
-"""Axes that move the camera and leave the scene as it is."""
+CAMERA_AXES: Mapping[str, str] = {
+    "arc": "a parameter of the arc",
+    "azimuth": "an azimuth in degrees",
+    "elevation": "an elevation in degrees",
+}
+"""Axes that move the camera and leave the scene as it is, with what their coordinates are."""
 
 SAME_NODE = 1e-6
 """A coordinate this close to a node, in steps of the grid, means the node: it may have been printed with
@@ -40,7 +45,7 @@ class Axis:
     """One dimension of a space."""
 
     name: str
-    """`arc`, `azimuth` and `elevation` (degrees) of the camera; `motion` of the object; `light`."""
+    """One of `CAMERA_AXES`, or of the sections that change the scene."""
     values: tuple[float, ...]
     """Where maps are stored: rising, within [low, high]. One value: the same maps serve the whole axis."""
     low: float
@@ -291,13 +296,7 @@ def format_point(point: Point) -> str:
 
 
 def _meaning(axis: str) -> str:
-    return {
-        "arc": "a parameter of the arc",
-        "azimuth": "an azimuth in degrees",
-        "elevation": "an elevation in degrees",
-        "motion": "a parameter of the motion",
-        "light": "a parameter of the light",
-    }.get(axis, f"a value of {axis}")
+    return CAMERA_AXES.get(axis, f"a parameter of the {axis}")
 
 
 def _wrapped(axis: Axis, value: float) -> float:
@@ -316,13 +315,9 @@ def jittered(cell: Sequence[tuple[float, float]], count: int, seed: tuple[int, .
 
 
 def space_of(config: SceneConfig) -> ParameterSpace:
-    """Return the space of a scene file: the camera's axes, then the object's, then the light's."""
-    axes = _camera_axes(config.views)
-    if config.motion is not None:
-        axes.append(_unit_axis("motion", config.motion.count))
-    if config.light is not None:
-        axes.append(_unit_axis("light", config.light.count))
-    return ParameterSpace(tuple(axes))
+    """Return the space of a scene file: the camera's axes, then those that change the scene."""
+    changes = [_unit_axis(name, axis.count) for name, axis in scene_axes(config).items()]
+    return ParameterSpace((*_camera_axes(config.views), *changes))
 
 
 def _camera_axes(views: Views) -> list[Axis]:

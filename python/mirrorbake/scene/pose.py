@@ -11,12 +11,10 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mirrorbake.scene.config import SceneConfig
-
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the object has moved to, as a function of its coordinate; lengths in metres.
+    """Where the object has moved to; lengths in metres.
 
     It turns about the vertical through the scene's zero, which is the centre of its base at rest.
     """
@@ -25,13 +23,6 @@ class Pose:
     """(3,) that it has moved."""
     turned: float
     """Degrees about the vertical."""
-
-    @staticmethod
-    def of(config: SceneConfig, coordinate: float) -> Pose:
-        """Return the pose at a coordinate of [motion]; at rest without that section."""
-        if config.motion is None:
-            return Pose(np.zeros(3), 0.0)
-        return Pose(coordinate * np.array(config.motion.to), coordinate * config.motion.turn)
 
     @property
     def rotation(self) -> NDArray[np.float64]:
@@ -51,6 +42,9 @@ class Pose:
             return points
         rest: NDArray[np.float64] = (points - self.offset) @ self.rotation
         return rest
+
+
+AT_REST = Pose(np.zeros(3), 0.0)
 
 
 def rotation_matrix(degrees: tuple[float, float, float]) -> NDArray[np.float64]:

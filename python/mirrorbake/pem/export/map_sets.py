@@ -11,8 +11,8 @@ from mirrorbake import _core
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.shells import moved_proxy
+from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.load import parse_config
-from mirrorbake.scene.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -140,7 +140,7 @@ def sample_set(store: PemStore, index: int) -> MapSet:
         raise OptionError(f"sample = {index}: expected 0 to {count - 1}")
     config = parse_config(header.source.config, str(store.location))
     place = header.space.scene_coordinates(header.space.sample(index))
-    pose = Pose.of(config, place.get("motion", 0.0))
+    pose = arranged(config, place).pose
     readers = {header.map_of(*name): name for name in header.map_names()}
     parts = _parts(
         header,

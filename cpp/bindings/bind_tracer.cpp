@@ -23,6 +23,9 @@ auto image_to_numpy(Image&& image) {
                                             static_cast<std::size_t>(image.width), image.channels.size()});
 }
 
+using IntList = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using FloatList = nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
 std::span<const glm::vec3> points(const PointArray& array) {
   static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
   return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
@@ -235,6 +238,22 @@ as the first rule of a list says that they match. The last rule takes the rest, 
       .def_rw("nearer_than", &ShellRule::nearer_than, "Along the reflected ray, metres, more than 0.")
       .def_prop_ro_static(
           "ITSELF", [](nb::handle) { return ShellRule::kItself; }, "The reflector, as an entry of `objects`.")
+      .def_prop_ro("has_limits", &ShellRule::has_limits,
+                   R"(Whether it holds some of the places of its things alone, so that those may be met again
+behind.)")
+      .def(
+          "holds",
+          [](const ShellRule& rule, const IntList& objects, const FloatList& distances, int reflector) {
+            std::vector<std::uint8_t> result =
+                held(rule, {objects.data(), objects.size()}, {distances.data(), distances.size()}, reflector);
+            const std::size_t count = result.size();
+            return to_numpy(std::move(result), {count});
+          },
+          nb::arg("objects"), nb::arg("distances"), nb::arg("reflector"),
+          signature<R"(def holds(self, objects: NDArray[numpy.int32], distances: NDArray[numpy.float32],
+reflector: int) -> NDArray[numpy.uint8])">(),
+          R"(1 where the rule holds what a ray meets, else 0: objects' numbers (n,), -1 for a light, at
+distances (n,) along the ray, metres.)")
       .def(
           "__eq__", [](const ShellRule& a, const ShellRule& b) { return a == b; }, nb::is_operator(),
           nb::sig("def __eq__(self, other: object, /) -> bool"));

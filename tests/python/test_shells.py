@@ -246,6 +246,18 @@ def test_what_a_part_has_no_map_of_is_in_the_shell_behind(tmp_path: Path) -> Non
         assert targets.shells == 3
 
 
+def test_a_rule_holds_its_objects_within_its_limits() -> None:
+    rule = _core.ShellRule("near", [_core.ShellRule.ITSELF, 4], nearer_than=2.0)
+    objects = np.array([1, 4, 4, 0, -1], np.int32)
+    distances = np.array([1.0, 1.0, 2.0, 1.0, 1.0], np.float32)
+    # -1 is a light, not the reflector.
+    assert rule.holds(objects, distances, 1).tolist() == [1, 1, 0, 0, 0]
+    assert rule.has_limits
+    assert not _core.ShellRule("ball", [1]).has_limits
+    with pytest.raises(mb.InvalidArgument, match=r"distances.*4 elements.*expected 5"):
+        rule.holds(objects, distances[:4], 1)
+
+
 @pytest.mark.parametrize(
     ("shells", "message"),
     [

@@ -19,10 +19,11 @@ from mirrorbake.errors import StoreError
 from mirrorbake.pem.header import Header, Source
 from mirrorbake.pem.pyramid import coarser_sizes, decimate, join_pyramid, residual_texels, split_pyramid
 from mirrorbake.pem.schema import checksum_of
-from mirrorbake.pem.shells import Part, Shell, ShellRule
+from mirrorbake.pem.shells import Part, Shell
 from mirrorbake.pem.store import GROUP_NAME, Contents, PemStore, SolverReport, Timings, exclusive
 from mirrorbake.pem.verify import verify
 from mirrorbake.pem.view_images import ViewImages
+from mirrorbake.scene.config_shells import ShellRule
 from mirrorbake.scene.parameters import Axis, ParameterSpace
 from mirrorbake.scene.plan import Decision, Plan
 
@@ -59,7 +60,7 @@ def make_header(**changes: Any) -> Header:
         ),
         plan=make_plan(),
         space=ParameterSpace((Axis("arc", (0.0, 0.5, 1.0), 0.0, 1.0),)),
-        rules=(ShellRule("local", ("itself",)), ShellRule("distant")),
+        rules=(ShellRule(name="local", objects=("itself",)), ShellRule(name="distant")),
         parts=(
             Part("body", (Shell("local", proxy, "body/local", "all", moves=True), distant)),
             Part("lid", (dataclasses.replace(distant, map="lid/distant"),)),

@@ -2,6 +2,7 @@
 #include <glm/geometric.hpp>
 
 #include "beauty.hpp"
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
 #include "options.hpp"
@@ -12,8 +13,8 @@ namespace mirrorbake {
 Image Tracer::capture(glm::vec3 origin, const Projection& projection, int width, int height,
                       std::span<const int> hidden, const TraceOptions& options) const {
   validate(projection);
-  tracing::check_range("width", width, 1, 16384);
-  tracing::check_range("height", height, 1, 16384);
+  check_range("width", width, 1, 16384);
+  check_range("height", height, 1, 16384);
   if (projection.kind == ProjectionKind::cube && width != height) {
     throw InvalidArgument("height", std::to_string(height), "the width: the faces of a cube map are square");
   }
@@ -35,7 +36,7 @@ Image Tracer::capture(glm::vec3 origin, const Projection& projection, int width,
 
 Image Tracer::capture_cube(glm::vec3 origin, int size, std::span<const int> hidden,
                            const TraceOptions& options) const {
-  tracing::check_range("size", size, 1, 16384);
+  check_range("size", size, 1, 16384);
   return capture(origin, Projection{ProjectionKind::cube}, size, size, hidden, options);
 }
 

@@ -315,7 +315,7 @@ std::vector<LayerTrace> Tracer::trace_layers(const Camera& camera, std::span<con
   validate(camera);
   tracing::validate(options);
   const PixelWindow window = tracing::window_in(options, camera.width, camera.height);
-  tracing::check_shells(options.shells, world.scene.objects.size());
+  check_shells(options.shells, world.scene.objects.size());
   std::vector<bool> seen(world.scene.objects.size(), false);
   for (int reflector : reflectors) {
     check_reflector(world, camera, reflector);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
 
@@ -12,13 +13,6 @@ namespace mirrorbake::tracing {
 bool usable(glm::vec3 p) {
   return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate &&
          std::abs(p.z) <= kLargestCoordinate;
-}
-
-void check_range(const char* argument, int value, int low, int high) {
-  if (value < low || value > high) {
-    throw InvalidArgument(argument, std::to_string(value),
-                          std::to_string(low) + " to " + std::to_string(high));
-  }
 }
 
 void check_point(const char* argument, glm::vec3 point) {

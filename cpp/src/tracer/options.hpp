@@ -7,8 +7,6 @@ namespace mirrorbake::tracing {
 /// Embree's own limit is 1.8e18.
 inline constexpr float kLargestCoordinate = 1e18F;
 
-/// Throws InvalidArgument unless `value` is in [low, high].
-void check_range(const char* argument, int value, int low, int high);
 /// Whether all coordinates are finite and near enough for Embree.
 bool usable(glm::vec3 point);
 /// Throws InvalidArgument for a point that is not finite or too far away for Embree.

@@ -2,83 +2,33 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
-
-#include "mirrorbake/core/error.hpp"
-#include "mirrorbake/core/text.hpp"
-#include "options.hpp"
-
 namespace mirrorbake::tracing {
-namespace {
-
-void check_rule(const ShellRule& rule, const std::string& where, int objects) {
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-  };
-  if (rule.name.empty() || !std::all_of(rule.name.begin(), rule.name.end(), is_plain)) {
-    throw InvalidArgument(where + ".name", "'" + rule.name + "'", "letters, digits, _ or -");
-  }
-  for (const int object : rule.objects) {
-    if (object == ShellRule::kItself || (object >= 0 && object < objects)) continue;
-    throw InvalidArgument(where + ".objects", std::to_string(object),
-                          "object numbers below " + std::to_string(objects) + ", or -1 for the reflector");
-  }
-  if (!(rule.nearer_than > 0.0F)) {
-    throw InvalidArgument(where + ".nearer_than", text_of(rule.nearer_than), "more than 0");
-  }
-}
-
-}  // namespace
-
-void check_shells(const std::vector<ShellRule>& shells, std::size_t objects) {
-  check_range("shells", static_cast<int>(shells.size()), 1, static_cast<int>(kMostShells));
-  for (std::size_t k = 0; k < shells.size(); ++k) {
-    const std::string where = "shells[" + std::to_string(k) + "]";
-    check_rule(shells[k], where, static_cast<int>(objects));
-    for (std::size_t other = 0; other < k; ++other) {
-      if (shells[other].name != shells[k].name) continue;
-      throw InvalidArgument(where + ".name", "'" + shells[k].name + "' again", "different names");
-    }
-  }
-  if (!shells.back().objects.empty() || std::isfinite(shells.back().nearer_than)) {
-    throw InvalidArgument("shells", "'" + shells.back().name + "' last, with a rule",
-                          "a last one without a rule, which takes the rest");
-  }
-}
-
-ShellRays::ShellRays(const World& world, std::span<const ShellRule> rules, int reflector) {
+ShellRays::ShellRays(const World& world, std::span<const ShellRule> rules, int reflector)
+    : rules_(rules.begin(), rules.end() - 1), reflector_(reflector) {
   std::vector<int> hidden;
   float begin = 0.0F;
-  bool nothing = false;
-  for (const ShellRule& rule : rules.first(rules.size() - 1)) {
-    Rule& own = rules_.emplace_back(Rule{rule, {}});
-    if (!rule.objects.empty()) own.is_of.resize(world.scene.objects.size(), false);
+  for (const ShellRule& rule : rules_) {
     for (int object : rule.objects) {
       if (object == ShellRule::kItself) object = reflector;
-      own.is_of[static_cast<std::size_t>(object)] = true;
       const bool is_new = std::find(hidden.begin(), hidden.end(), object) == hidden.end();
-      if (rule.nearer_than == kUnlimited && is_new) hidden.push_back(object);
+      if (!rule.has_limits() && is_new) hidden.push_back(object);
     }
-    if (rule.objects.empty()) begin = std::max(begin, rule.nearer_than);
-    nothing = nothing || own.all_that_is_hit();
-    rests_.push_back({world.rays.without(hidden), begin, nothing});
+    begin = std::max(begin, rule.holds_all_before());
+    rests_.push_back({world.rays.without(hidden), begin});
   }
 }
 
 std::size_t ShellRays::shell_of(const Hit& hit) const {
-  std::size_t k = 0;
   if (hit.missed()) return rules_.size();
-  for (; k < rules_.size(); ++k) {
-    const std::vector<bool>& is_of = rules_[k].is_of;
-    const bool is_kind = is_of.empty() || (hit.geometry < is_of.size() && is_of[hit.geometry]);
-    if (is_kind && hit.distance < rules_[k].rule.nearer_than) break;
-  }
-  return k;
+  const auto holds = [&](const ShellRule& rule) {
+    return rule.holds(static_cast<int>(hit.geometry), hit.distance, reflector_);
+  };
+  return static_cast<std::size_t>(std::find_if(rules_.begin(), rules_.end(), holds) - rules_.begin());
 }
 
 Hit ShellRays::first_of_rest(std::size_t shell, Ray ray) const {
   const Rest& rest = rests_[shell];
-  if (rest.nothing) return {};
+  if (rest.begin == kUnlimited) return {};
   ray.min_distance = rest.begin;
   for (;;) {
     const Hit hit = rest.view.intersect(ray, RayKind::reflection);

@@ -35,9 +35,6 @@ struct IncidentShells {
   }
 };
 
-/// Throws InvalidArgument unless the rules are usable in a scene of so many objects.
-void check_shells(const std::vector<ShellRule>& shells, std::size_t objects);
-
 /// The rules of TraceOptions for one reflector.
 class ShellRays {
  public:
@@ -50,24 +47,19 @@ class ShellRays {
                        const SampleStream& stream) const;
 
  private:
-  struct Rule {
-    ShellRule rule;
-    std::vector<bool> is_of;  ///< for every object of the scene, if the rule names any
-    bool all_that_is_hit() const { return is_of.empty() && rule.nearer_than == kUnlimited; }
-  };
   static constexpr float kUnlimited = std::numeric_limits<float>::infinity();
 
   /// Where to look for what the shells up to one leave.
   struct Rest {
     RayScene::View view;  ///< without the objects that they hold at any distance
     float begin = 0.0F;   ///< distance before which they hold everything
-    bool nothing = false;
   };
 
   std::size_t shell_of(const Hit& hit) const;
   Hit first_of_rest(std::size_t shell, Ray ray) const;
 
-  std::vector<Rule> rules_;  ///< all but the last, which takes what is left
+  std::vector<ShellRule> rules_;  ///< all but the last, which takes what is left
+  int reflector_;
   std::vector<Rest> rests_;  ///< of each rule
 };
 

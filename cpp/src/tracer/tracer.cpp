@@ -1,4 +1,5 @@
 #include "mirrorbake/tracer/tracer.hpp"
+#include "mirrorbake/core/check.hpp"
 
 #include <string>
 #include <utility>
@@ -16,14 +17,12 @@ const Scene& validated(const Scene& scene) {
 }
 
 const TracerOptions& validated(const TracerOptions& options) {
-  tracing::check_range("cache_rays", options.cache_rays, 1, 65536);
-  tracing::check_range("cache_bounces", options.cache_bounces, 1, 16);
+  check_range("cache_rays", options.cache_rays, 1, 65536);
+  check_range("cache_bounces", options.cache_bounces, 1, 16);
   return options;
 }
 
 }  // namespace
-
-std::vector<ShellRule> default_shell_rules() { return {{"local", {ShellRule::kItself}}, {"distant", {}}}; }
 
 Tracer::State::State(Scene scene, const TracerOptions& options)
     : lit((validated(scene), std::move(scene)), validated(options)) {}

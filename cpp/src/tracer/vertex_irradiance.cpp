@@ -3,6 +3,7 @@
 #include <glm/geometric.hpp>
 
 #include "gather.hpp"
+#include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "options.hpp"

@@ -12,8 +12,6 @@ from mirrorbake.pem.pyramid import FACES, capture, pyramid_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
     from mirrorbake.pem.pyramid import Projection
@@ -53,8 +51,8 @@ def captured_shells(
             layers.append(None)
             continue
         alpha = _covered(stage, origin, projection, size, rule, hidden)[..., None]
-        if np.isfinite(rule.nearer_than):
-            # What is further away cannot be looked at alone: near things stay in what is behind.
+        if rule.has_limits:
+            # What is beyond the limits cannot be looked at alone: what is held stays in what is behind.
             layers.append(np.concatenate([alpha * whole, alpha], axis=-1))
             continue
         hidden += others
@@ -78,7 +76,6 @@ def _covered(
     places = (2.0 * (np.arange(SUBTEXELS * size) + 0.5) / (SUBTEXELS * size) - 1.0).astype(np.float32)
     across, up = np.meshgrid(places, -places)
     points = np.ascontiguousarray(np.stack([across.ravel(), up.ravel()], axis=-1))
-    known = list(rule.objects)
     shares = []
     for face in range(FACES[projection]):
         faces = np.full(len(points), face, np.int32)
@@ -86,10 +83,7 @@ def _covered(
         directions = _core.directions_from_points(name, faces, points)
         origins = np.broadcast_to(np.asarray(origin, np.float32), directions.shape)
         distance, met = stage.tracer.intersect_distance(np.ascontiguousarray(origins), directions, hidden)
-        mine: NDArray[np.bool_] = np.asarray(distance) < rule.nearer_than
-        if known:
-            mine &= np.isin(met, known)
-        grid = mine.reshape(size, SUBTEXELS, size, SUBTEXELS)
+        grid = rule.holds(met, distance, stage.built.reflector).reshape(size, SUBTEXELS, size, SUBTEXELS)
         shares.append(grid.mean(axis=(1, 3), dtype=np.float32))
     return np.stack(shares)
 

@@ -14,10 +14,9 @@ from mirrorbake.bake.static_set import infer_static_set
 from mirrorbake.pem.header import Header
 from mirrorbake.pem.pyramid import capture
 from mirrorbake.pem.run_time import TRACED_SAMPLES
-from mirrorbake.pem.shells import Part, Shell, ShellRule
+from mirrorbake.pem.shells import Part, Shell
 from mirrorbake.pem.store import Contents
 from mirrorbake.proxy import hull_triangles, proxy_to_attributes
-from mirrorbake.scene.config_shells import ITSELF
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,10 +57,7 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
         source=source,
         plan=plan,
         space=built.space,
-        rules=tuple(
-            ShellRule(table["name"], tuple(table.get("objects", ())), table.get("nearer_than"))
-            for table in plan.shell_tables
-        ),
+        rules=tuple(shell.rule for shell in plan.shell_sections),
         parts=tuple(_part(built, plan, number, shared=shared) for number in range(len(built.part_names))),
         static={
             "infinite": proxy_to_attributes(_core.Proxy.infinite(origin)),
@@ -123,21 +119,20 @@ def _part(built: BuiltScene, plan: Plan, number: int, *, shared: bool) -> Part:
     name = built.part_names[number]
     hull: Literal["all", "off hull"] = "off hull" if plan.has_hull_split else "all"
     shells = []
-    for planned, table in zip(plan.shells, plan.shell_tables, strict=True):
+    for planned, section in zip(plan.shells, plan.shell_sections, strict=True):
         if name not in planned.parts:
             continue
         # A map that all parts read bears the name of its shell alone.
         is_last = planned is plan.shells[-1]
         its_map = planned.name if is_last and shared else f"{name}/{planned.name}"
-        itself = table.get("objects") == [ITSELF]
         # Polygons on the convex hull cannot reflect the object.
         shells.append(
             Shell(
                 planned.name,
                 planned.proxy or _ellipsoid_about(built, number),
                 its_map,
-                hull if itself else "all",
-                moves=itself,
+                hull if section.is_itself else "all",
+                moves=section.is_itself,
             )
         )
     return Part(name, tuple(shells))

@@ -10,7 +10,7 @@ from mirrorbake import _core
 from mirrorbake.bake.probe import probe_points
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, proxy_to_attributes
-from mirrorbake.scene.config_shells import DEFAULT_SHELLS, ITSELF
+from mirrorbake.scene.config_shells import DEFAULT_SHELLS
 from mirrorbake.scene.plan import Decision, PlannedShell
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def shell_distances(stage: Stage, probe: Probe, shell: int) -> FloatArray:
 
         hidden = set[int]() if reflector in numbers(rules[shell]) else {reflector}
         for rule in rules[:shell]:
-            if not np.isfinite(rule.nearer_than):
+            if not rule.has_limits:
                 hidden |= set(numbers(rule))
         distances[chosen], objects[chosen] = moved.tracer.intersect_distance(
             np.ascontiguousarray(probe.position[chosen]),
@@ -67,8 +67,7 @@ def shell_distances(stage: Stage, probe: Probe, shell: int) -> FloatArray:
         )
     held = np.zeros(len(distances), np.bool_)
     for k, rule in enumerate(rules[: shell + 1]):
-        known = [stage.built.reflector if i == rule.ITSELF else i for i in rule.objects]
-        mine = (np.isin(objects, known) if known else True) & (distances < rule.nearer_than) & ~held
+        mine = rule.holds(objects, distances, stage.built.reflector).astype(np.bool_) & ~held
         if k == shell and shell + 1 < len(rules):
             return np.where(mine, distances, np.float32(0.0)).astype(np.float32)
         if k < shell:
@@ -171,7 +170,7 @@ def planned_shells(
     names, shells = stage.built.part_names, stage.config.shells or DEFAULT_SHELLS
     planned = []
     for number, shell in enumerate(shells[:-1]):
-        itself = shell.objects == (ITSELF,)
+        itself = shell.is_itself
         alpha = probe.shells[number][:, 3]
         seen = {name: alpha[probe.part == part] for part, name in enumerate(names)}
         parts = [

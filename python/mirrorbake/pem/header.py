@@ -14,7 +14,8 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.pem.pyramid import FACES, Projection, coarser_sizes, topology_of
 from mirrorbake.pem.schema import FORMAT_VERSION, checksum_of
-from mirrorbake.pem.shells import MapEntry, Part, Shell, ShellRule, maps_of
+from mirrorbake.pem.shells import MapEntry, Part, Shell, maps_of
+from mirrorbake.scene.config_shells import ShellRule
 from mirrorbake.scene.parameters import ParameterSpace
 from mirrorbake.scene.plan import Plan
 
@@ -148,7 +149,7 @@ class Header:
             "image_size": list(self.image_size),
             "origin": list(self.origin),
             "space": self.space.to_attributes(),
-            "shells": [asdict(rule) for rule in self.rules],
+            "shells": [rule.model_dump() for rule in self.rules],
             "parts": [asdict(part) | {"shells": [asdict(s) for s in part.shells]} for part in self.parts],
             "maps": [asdict(entry) for entry in self.maps],
             "static": self.static,
@@ -177,10 +178,7 @@ class Header:
             source=Source(attributes["library"], attributes["config"], attributes["inputs"]),
             plan=Plan.from_dict(attributes["plan"]),
             space=ParameterSpace.from_attributes(attributes["space"]),
-            rules=tuple(
-                ShellRule(rule["name"], tuple(rule["objects"]), rule["nearer_than"])
-                for rule in attributes["shells"]
-            ),
+            rules=tuple(ShellRule.model_validate(rule) for rule in attributes["shells"]),
             parts=tuple(parts),
             static=attributes["static"],
             projection=attributes["projection"],

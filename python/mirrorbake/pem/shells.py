@@ -8,29 +8,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mirrorbake.proxy import proxy_from_attributes
-from mirrorbake.scene.config_shells import ITSELF
 
 if TYPE_CHECKING:
     from mirrorbake import _core
     from mirrorbake.scene.pose import Pose
 
 HullPolygons = Literal["all", "off hull"]
-
-
-@dataclass(frozen=True)
-class ShellRule:
-    """What of a reflected ray a shell holds: what it meets first, where it is of this kind."""
-
-    name: str
-    objects: tuple[str, ...] = ()
-    """Names in the scene, `itself` of the reflector; none: all, lights and the background included."""
-    nearer_than: float | None = None
-    """Metres along the ray; None: at any distance."""
-
-    @property
-    def is_itself(self) -> bool:
-        """Whether it holds nothing but what the object reflects of itself."""
-        return self.objects == (ITSELF,)
 
 
 @dataclass(frozen=True)

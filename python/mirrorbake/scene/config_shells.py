@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
@@ -26,8 +26,8 @@ ShellShape: TypeAlias = Literal[
 """Geometry of a shell; "auto" fits what its rays meet, and an ellipsoid about each part for `itself`."""
 
 
-class ShellSection(Section):
-    """[[shells]]: one shell, nearer than those after it."""
+class ShellRule(Section):
+    """What of a reflected ray a shell holds: what it meets first, where it is of this kind."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
     """Letters, digits, `_` and `-`."""
@@ -37,12 +37,33 @@ class ShellSection(Section):
     """Names of objects that it holds, `*` for any letters; `itself` is the reflector. None: all."""
     nearer_than: Annotated[float, Field(gt=0, le=1e12)] | None = None
     """Holds only what reflected rays meet within so many metres."""
-    proxy: ShellShape = "auto"
+
+    @property
+    def is_itself(self) -> bool:
+        """Whether it holds nothing but what the object reflects of itself."""
+        return self.objects == (ITSELF,)
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """What tells which places of its things it holds: arguments of `_core.ShellRule`."""
+        keys = ShellRule.model_fields.keys() - {"name", "objects"}
+        return {key: value for key in sorted(keys) if (value := getattr(self, key)) is not None}
 
     @property
     def takes_rest(self) -> bool:
         """Whether it holds whatever it gets."""
-        return not self.objects and self.nearer_than is None
+        return not self.objects and not self.limits
+
+
+class ShellSection(ShellRule):
+    """[[shells]]: one shell, nearer than those after it."""
+
+    proxy: ShellShape = "auto"
+
+    @property
+    def rule(self) -> ShellRule:
+        """What it holds, whatever it lies on."""
+        return ShellRule(**{key: getattr(self, key) for key in ShellRule.model_fields})
 
 
 Shells: TypeAlias = tuple[ShellSection, ...]
@@ -78,6 +99,6 @@ def check_shells(shells: Shells) -> None:
         for name in shell.objects:
             if name in held:
                 raise ValueError(f"shells: {name!r} is in {held[name]!r} and again in {shell.name!r}")
-            # Within a distance only, what is further away is left for another.
-            if shell.nearer_than is None:
+            # What lies beyond the limits is left for another.
+            if not shell.limits:
                 held[name] = shell.name

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
-from mirrorbake.scene.config_shells import ShellSection
+from mirrorbake.scene.config_shells import Shells, ShellSection
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -139,9 +139,10 @@ class Plan:
         return bool(self.value("layers.hull_split"))
 
     @property
-    def shell_tables(self) -> list[dict[str, Any]]:
-        """The tables of [[shells]]."""
-        return cast("list[dict[str, Any]]", self.value("shells"))
+    def shell_sections(self) -> Shells:
+        """The sections [[shells]]."""
+        tables = cast("list[dict[str, Any]]", self.value("shells"))
+        return tuple(ShellSection.model_validate(table) for table in tables)
 
     def resolve(self, config: SceneConfig) -> SceneConfig:
         """Return the scene with what the tracing of its views needs in place of "auto"."""
@@ -158,7 +159,7 @@ class Plan:
                 "views": resolved("views", "traced"),
                 "infer": resolved("infer", "passes", "neighbours"),
                 "static": resolved("static", "views"),
-                "shells": tuple(ShellSection.model_validate(table) for table in self.shell_tables),
+                "shells": self.shell_sections,
             }
         )
 

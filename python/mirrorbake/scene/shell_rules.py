@@ -51,13 +51,10 @@ def trace_rules(shells: Shells, names: Sequence[str], reflector: int) -> list[_c
                     f"shells: {what!r} is in {held[number]!r} and again in {shell.name!r}, "
                     "which gets nothing of it"
                 )
-            # Within a distance only, what is further away is left for another.
-            if shell.nearer_than is None:
+            # What lies beyond the limits is left for another.
+            if not shell.limits:
                 held[number] = shell.name
-        if shell.nearer_than is None:
-            rules.append(_core.ShellRule(shell.name, objects))
-        else:
-            rules.append(_core.ShellRule(shell.name, objects, shell.nearer_than))
+        rules.append(_core.ShellRule(shell.name, objects, **shell.limits))
     return rules
 
 

@@ -77,6 +77,23 @@ TEST(Shells, HoldWhatTheirRuleSaysWithTheKindsBeforeThemLeftOut) {
   EXPECT_GT(behind, 0);
 }
 
+TEST(Shells, ARuleHoldsItsObjectsWithinItsLimits) {
+  const ShellRule near_things{"near", {ShellRule::kItself, 4}, 2.0F};
+  const int reflector = 1;
+  const float far = std::numeric_limits<float>::infinity();
+  const std::vector<std::int32_t> objects{1, 4, 4, 4, 0, -1, -1};
+  const std::vector<float> distances{1.0F, 1.0F, 2.0F, far, 1.0F, 1.0F, far};
+  using Flags = std::vector<std::uint8_t>;
+  EXPECT_EQ(held(near_things, objects, distances, reflector), (Flags{1, 1, 0, 0, 0, 0, 0}));
+  // Without names, lights too, which are no object; with any limit or none, never what no ray meets.
+  EXPECT_EQ(held({"any", {}, 2.0F}, objects, distances, reflector), (Flags{1, 1, 0, 0, 1, 1, 0}));
+  EXPECT_EQ(held({"all", {}}, objects, distances, reflector), (Flags{1, 1, 1, 0, 1, 1, 0}));
+  EXPECT_TRUE(near_things.has_limits());
+  EXPECT_FALSE(ShellRule{}.has_limits());
+  EXPECT_EQ(near_things.holds_all_before(), 0.0F);
+  EXPECT_EQ((ShellRule{"any", {}, 2.0F}).holds_all_before(), 2.0F);
+}
+
 TEST(Shells, WrongRulesAreErrors) {
   const Props props;
   const Tracer tracer(props.scene);

@@ -15,6 +15,7 @@
 #include "mirrorbake/scene/scene.hpp"
 #include "mirrorbake/surface/surface_samples.hpp"
 #include "mirrorbake/tracer/camera.hpp"
+#include "mirrorbake/tracer/shell_rule.hpp"
 
 /// Ray tracing with Embree, which stays behind this header.
 namespace mirrorbake {
@@ -43,24 +44,6 @@ struct PixelWindow {
 
   bool operator==(const PixelWindow&) const = default;
 };
-
-/// What one shell of a reflector's environment holds ([PEM] §4: "this method easily generalizes to more than
-/// two environmental shells"): the things that a reflected ray meets first, as the first rule says that they
-/// match. The last rule of a list takes all that the others leave, and the background.
-struct ShellRule {
-  static constexpr int kItself = -1;  ///< the reflector, as an entry of `objects`
-
-  std::string name;          ///< letters, digits, _ and −
-  std::vector<int> objects;  ///< numbers of objects, or kItself; empty: any, and lights
-  float nearer_than = std::numeric_limits<float>::infinity();  ///< along the reflected ray, metres, > 0
-
-  bool operator==(const ShellRule&) const = default;
-};
-
-/// [PEM] §4: `local`, the reflector itself, and `distant`, the rest.
-std::vector<ShellRule> default_shell_rules();
-
-inline constexpr std::size_t kMostShells = 8;
 
 struct TraceOptions {
   int samples_per_pixel = 16;  ///< 1…65536, stratified

@@ -3,10 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include <nanobind/nanobind.h>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
@@ -50,12 +52,10 @@ struct EnumNames {};
 template <typename E>
 E enum_value(const std::string& name) {
   constexpr auto all = EnumNames<E>::all;
-  std::string expected;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (name == all[i]) return static_cast<E>(i);
-    expected += (i == 0 ? "" : i + 1 < all.size() ? ", " : " or ") + std::string(all[i]);
   }
-  throw InvalidArgument(EnumNames<E>::what, name, expected);
+  throw InvalidArgument(EnumNames<E>::what, name, listed(std::vector<std::string>(all.begin(), all.end())));
 }
 
 }  // namespace mirrorbake::bindings

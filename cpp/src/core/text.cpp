@@ -32,6 +32,14 @@ std::string shortest(Real number) {
 
 }  // namespace
 
+std::string listed(std::span<const std::string> choices) {
+  std::string text;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 < choices.size() ? ", " : " or ") + choices[i];
+  }
+  return text;
+}
+
 std::string text_of(float number) { return shortest(number); }
 std::string text_of(double number) { return shortest(number); }
 std::string text_of(glm::vec2 v) { return "(" + text_of(v.x) + ", " + text_of(v.y) + ")"; }

@@ -9,12 +9,6 @@
 
 namespace mirrorbake::image_files {
 
-/// Opens a part of an EXR file, with its integer channels (ids) as they are and its colours relative to Rec.
-/// 709. Channels in no layer come before those of layers; V-Ray's ".R" is "R". Throws FileError for anything
-/// but flat pixels with a value of every channel for every pixel, or luminance with chroma of half the size.
-std::unique_ptr<Reader> open_exr(const std::string& name, std::shared_ptr<const Bytes> bytes,
-                                 const ImageChoice& choice);
-
 /// Walks the headers and throws FileError if an attribute is longer than the file, before OpenEXR makes room
 /// for it.
 void check_exr(const std::string& name, const Bytes& bytes);

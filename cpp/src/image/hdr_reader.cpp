@@ -12,7 +12,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "hdr_file.hpp"
+#include "image_files.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "primaries.hpp"
 

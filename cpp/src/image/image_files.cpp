@@ -4,62 +4,68 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
-#include <initializer_list>
+#include <vector>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/text.hpp"
 
 namespace mirrorbake::image_files {
+
+namespace {
+
+std::string lower_extension(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+}  // namespace
+
+const ImageKind& row_of(FileKind kind) {
+  return *std::find_if(kImageKinds.begin(), kImageKinds.end(),
+                       [&](const ImageKind& row) { return row.kind == kind; });
+}
 
 // Only these readers ever see a file: OpenImageIO left to itself tries all of its plugins on one it does not
 // recognise.
 FileKind kind_of(const std::string& name, const Bytes& bytes) {
-  std::array<unsigned char, 12> head{};
-  const std::size_t size = bytes.read(0, head);
-  const auto has = [&](std::size_t place, std::initializer_list<int> magic) {
-    return size >= place + magic.size() &&
-           std::equal(magic.begin(), magic.end(), head.begin() + static_cast<std::ptrdiff_t>(place),
-                      [](int a, unsigned char b) { return a == b; });
-  };
-  const auto starts_with = [&](std::initializer_list<int> magic) { return has(0, magic); };
-  if (starts_with({0x76, 0x2f, 0x31, 0x01})) return FileKind::exr;
-  if (starts_with({'#', '?'})) return FileKind::hdr;
-  if (starts_with({'I', 'I', 42, 0}) || starts_with({'I', 'I', 43, 0}) || starts_with({'M', 'M', 0, 42}) ||
-      starts_with({'M', 'M', 0, 43})) {
-    return FileKind::tiff;
+  std::array<unsigned char, kHeadBytes> buffer{};
+  const std::size_t size = bytes.read(0, buffer);
+  const std::string head(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size));
+  std::vector<std::string> known;
+  for (const ImageKind& row : kImageKinds) {
+    if (row.begins(head)) return row.kind;
+    known.emplace_back(row.name);
   }
-  if (starts_with({0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a})) return FileKind::png;
-  if (starts_with({0xff, 0xd8, 0xff})) return FileKind::jpeg;
-  if (starts_with({'R', 'I', 'F', 'F'}) && has(8, {'W', 'E', 'B', 'P'})) return FileKind::webp;
-  throw FileError(name, "is not an EXR, HDR, TIFF, PNG, JPEG or WebP image");
+  throw FileError(name, "is not an " + listed(known) + " image");
 }
 
 std::optional<FileKind> known_extension(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".exr") return FileKind::exr;
-  if (extension == ".hdr") return FileKind::hdr;
-  if (extension == ".tif" || extension == ".tiff") return FileKind::tiff;
-  if (extension == ".png") return FileKind::png;
-  if (extension == ".jpg" || extension == ".jpeg") return FileKind::jpeg;
+  const std::string extension = lower_extension(path);
+  if (extension.empty()) return std::nullopt;
+  for (const ImageKind& row : kImageKinds) {
+    if (std::find(row.extensions.begin(), row.extensions.end(), extension) != row.extensions.end()) {
+      return row.kind;
+    }
+  }
   return std::nullopt;
 }
 
 FileKind kind_from_extension(const std::string& path) {
   if (const std::optional<FileKind> kind = known_extension(path)) return *kind;
-  throw FileError(path, "has an unknown extension, expected .exr, .hdr, .tif, .tiff, .png, .jpg or .jpeg");
+  std::vector<std::string> known;
+  for (const ImageKind& row : kImageKinds) {
+    for (const std::string_view extension : row.extensions) {
+      if (!extension.empty()) known.emplace_back(extension);
+    }
+  }
+  throw FileError(path, "has an unknown extension, expected " + listed(known));
 }
 
 Guard guard_of(const std::string& name, FileKind kind, const Bytes& bytes) {
-  switch (kind) {
-    case FileKind::png: return guard_png(name, bytes);
-    case FileKind::jpeg: return guard_jpeg(name, bytes);
-    case FileKind::tiff: return guard_tiff(name, bytes);
-    case FileKind::exr:
-    case FileKind::hdr:
-    case FileKind::webp: break;
-  }
-  return {};
+  const ImageKind& row = row_of(kind);
+  return row.guard == nullptr ? Guard{} : row.guard(name, bytes);
 }
 
 void check_limits(const std::string& path, const Header& header, const ImageLimits& limits) {

@@ -11,14 +11,15 @@
 
 #include "bytes.hpp"
 #include "guard.hpp"
+#include "image_kinds.hpp"
 #include "mirrorbake/image/image_io.hpp"
 
 /// What the readers of image files share: OpenEXR's, which is part of this library, and OpenImageIO's in a
 /// library that is loaded when it is needed. Nothing here knows either.
 namespace mirrorbake::image_files {
 
-enum class FileKind { exr, hdr, tiff, png, jpeg, webp };
-
+/// The row of the table.
+const ImageKind& row_of(FileKind kind);
 /// Kind by content: the first bytes. Throws FileError, in which `name` stands for the path.
 FileKind kind_of(const std::string& name, const Bytes& bytes);
 /// Kind by extension of those that are written, the second throws FileError if it names none.

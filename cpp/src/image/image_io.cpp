@@ -11,14 +11,13 @@
 #include <utility>
 
 #include "exr_file.hpp"
-#include "hdr_file.hpp"
 #include "image_files.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
 #include "mirrorbake/image/color.hpp"
 #include "openimageio.hpp"
-#include "webp_file.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -182,61 +181,34 @@ auto file_errors(const std::string& name, const char* problem, const Work& work)
 
 constexpr const char* kDamaged = "is damaged or truncated";
 
+constexpr std::array kFormatNames{"automatic", "half", "float32", "uint8", "uint16"};
+
 PixelFormat storage_format(const std::string& path, FileKind kind, PixelFormat format) {
-  const auto refuse = [&](const char* expected) {
-    throw FileError(path, std::string("its format cannot store these pixels, expected ") + expected);
-  };
-  switch (kind) {
-    case FileKind::exr:
-      if (format == PixelFormat::automatic || format == PixelFormat::half) return PixelFormat::half;
-      if (format != PixelFormat::float32) refuse("half or float32");
-      return PixelFormat::float32;
-    case FileKind::hdr:
-      if (format != PixelFormat::automatic && format != PixelFormat::float32)
-        refuse("float32 (stored as RGBE)");
-      return PixelFormat::float32;
-    case FileKind::png:
-      if (format == PixelFormat::uint16) return PixelFormat::uint16;
-      if (format != PixelFormat::automatic && format != PixelFormat::uint8) refuse("uint8 or uint16");
-      return PixelFormat::uint8;
-    case FileKind::jpeg:
-      if (format != PixelFormat::automatic && format != PixelFormat::uint8) refuse("uint8");
-      return PixelFormat::uint8;
-    case FileKind::tiff:
-      if (format == PixelFormat::half) return PixelFormat::half;
-      if (format == PixelFormat::uint8) return PixelFormat::uint8;
-      if (format == PixelFormat::uint16) return PixelFormat::uint16;
-      return PixelFormat::float32;
-    case FileKind::webp: break;  // is only read
+  const auto& formats = image_files::row_of(kind).formats;
+  if (format == PixelFormat::automatic) return formats.front();
+  std::vector<std::string> expected;
+  for (const PixelFormat own : formats) {
+    if (own == format) return format;
+    if (own != PixelFormat::automatic) expected.emplace_back(kFormatNames[static_cast<std::size_t>(own)]);
   }
-  return format;
+  throw FileError(path, "its format cannot store these pixels, expected " + listed(expected));
 }
 
 void check_channels(const std::string& path, FileKind kind, std::span<const std::string> channels) {
-  const std::size_t count = channels.size();
-  const bool ends_with_alpha = channels.back() == "A";
-  const bool holds = kind == FileKind::png    ? count <= 4 && (count % 2 == 0) == ends_with_alpha
-                     : kind == FileKind::jpeg ? count == 1 || (count == 3 && !ends_with_alpha)
-                     : kind == FileKind::hdr  ? count == 3 && !ends_with_alpha
-                                              : true;
-  if (holds) return;
-  throw FileError(path, std::string("a ") +
-                            (kind == FileKind::png    ? "PNG holds Y; Y, A; R, G, B or R, G, B, A"
-                             : kind == FileKind::jpeg ? "JPEG holds Y or R, G, B"
-                                                      : "HDR file holds R, G, B") +
-                            ", the image has " + std::to_string(count) + " channels, the last named " +
-                            channels.back());
+  const image_files::ImageKind& row = image_files::row_of(kind);
+  if (row.holds == nullptr || row.holds(channels.size(), channels.back() == "A")) return;
+  throw FileError(path, std::string(row.name) + " holds " + std::string(row.held) + ", the image has " +
+                            std::to_string(channels.size()) + " channels, the last named " + channels.back());
 }
 
 }  // namespace
 
 PixelFormat parse_pixel_format(std::string_view name) {
-  if (name == "automatic") return PixelFormat::automatic;
-  if (name == "half") return PixelFormat::half;
-  if (name == "float32") return PixelFormat::float32;
-  if (name == "uint8") return PixelFormat::uint8;
-  if (name == "uint16") return PixelFormat::uint16;
-  throw InvalidArgument("format", name, "automatic, half, float32, uint8 or uint16");
+  for (std::size_t i = 0; i < kFormatNames.size(); ++i) {
+    if (name == kFormatNames[i]) return static_cast<PixelFormat>(i);
+  }
+  throw InvalidArgument("format", name,
+                        listed(std::vector<std::string>(kFormatNames.begin(), kFormatNames.end())));
 }
 
 std::vector<std::string> default_channels(int count) {
@@ -265,7 +237,7 @@ ImageSize read_image_size(const std::string& path, const ImageLimits& limits) {
     const bool is_exchanged = header.orientation >= 5;
     return ImageSize{is_exchanged ? header.display.height : header.display.width,
                      is_exchanged ? header.display.width : header.display.height, header.channel_count(),
-                     header.orientation == 1 && kind != FileKind::webp && kind != FileKind::hdr};
+                     header.orientation == 1 && image_files::row_of(kind).is_tileable};
   });
 }
 

@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "image_files.hpp"
 #include "mirrorbake/core/error.hpp"
-#include "webp_file.hpp"
 
 namespace mirrorbake::image_files {
 namespace {

@@ -53,12 +53,12 @@ void check_pixel_count(const std::string& where, const Image& image) {
 }
 
 void check_channel_count(const std::string& where, const Image& image, std::initializer_list<int> expected) {
-  std::string list;
+  std::vector<std::string> counts;
   for (const int count : expected) {
     if (image.channel_count() == count) return;
-    list += (list.empty() ? "" : " or ") + std::to_string(count);
+    counts.push_back(std::to_string(count));
   }
-  throw InvalidArgument(where + " channel count", std::to_string(image.channel_count()), list);
+  throw InvalidArgument(where + " channel count", std::to_string(image.channel_count()), listed(counts));
 }
 
 void check_texels(const std::string& where, const Image& image, float maximum, std::string_view expected) {

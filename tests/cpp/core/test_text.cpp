@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <string>
+#include <vector>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
@@ -59,6 +60,13 @@ TEST(Text, OfNumbersIsTheShortestThatReadsBack) {
   EXPECT_EQ(text_of(glm::vec2(1.0F, -0.5F)), "(1, -0.5)");
   EXPECT_EQ(text_of(glm::vec3(0.0F, 1e30F, 0.3F)), "(0, 1e+30, 0.3)");
   EXPECT_EQ(text_of(glm::dvec3(0.0, 0.1, -2.0)), "(0, 0.1, -2)");
+}
+
+TEST(Text, ChoicesAreListedInWords) {
+  using Choices = std::vector<std::string>;
+  EXPECT_EQ(listed(Choices{"a"}), "a");
+  EXPECT_EQ(listed(Choices{"a", "b"}), "a or b");
+  EXPECT_EQ(listed(Choices{"a", "b", "c"}), "a, b or c");
 }
 
 }  // namespace

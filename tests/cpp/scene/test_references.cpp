@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -68,6 +69,16 @@ TEST_F(References, OutsideOfTheDirectoryAreNotFollowed) {
   const std::string path = write("inside/scene.obj", "mtllib ../secret.mtl\nv 0 0 0\n");
   EXPECT_THAT(of(path, FileContent::scene), IsEmpty());
   EXPECT_THROW(referenced_files((directory_ / "none.gltf").string(), FileContent::mesh), FileError);
+}
+
+TEST_F(References, OfAFileThatNoReaderTakesAreAnErrorThatNamesThoseThatAreRead) {
+  const std::string path = write("scene.ply", "ply");
+  for (const auto& read :
+       std::vector<std::function<void()>>{[&] { referenced_files(path, FileContent::scene); },
+                                          [&] { load_mesh(path); }, [&] { load_scene(path); }}) {
+    EXPECT_THAT(read, ::testing::ThrowsMessage<FileError>(
+                          ::testing::HasSubstr("has the extension '.ply', expected .obj, .gltf or .glb")));
+  }
 }
 
 }  // namespace

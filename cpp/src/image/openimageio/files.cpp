@@ -17,18 +17,6 @@
 namespace mirrorbake::image_files {
 namespace {
 
-const char* plugin_name(FileKind kind) {
-  switch (kind) {
-    case FileKind::exr: return "openexr";
-    case FileKind::hdr: return "hdr";
-    case FileKind::tiff: return "tiff";
-    case FileKind::png: return "png";
-    case FileKind::jpeg: return "jpeg";
-    case FileKind::webp: return "webp";
-  }
-  return "";
-}
-
 // Bytes of pixels from one byte of the file: deflate, in PNG and TIFF, gives at most 1032; JPEG 1024: six
 // blocks of two bits at least for 16 x 16 pixels of 3 bytes, if its chroma is subsampled; LZW 2730; T.6 a row
 // of 65536 white pixels for one bit. OpenEXR's DCT is not looked into.
@@ -158,7 +146,7 @@ OpenInput open_input(const std::string& path, FileKind kind, std::shared_ptr<con
   } else {
     input.bytes = std::make_unique<GuardedBytes>(path, std::move(bytes), std::move(guard.patches));
   }
-  input.input = OIIO::ImageInput::create(plugin_name(kind));
+  input.input = OIIO::ImageInput::create(row_of(kind).plugin);
   if (!input.input) throw FileError(path, "cannot be read: " + one_line(OIIO::geterror()));
   if (!input->set_ioproxy(input.bytes.get())) {
     throw FileError(path, "cannot be read: this OpenImageIO reads its format only from files that it opens");
@@ -214,7 +202,7 @@ SaveReport save_file(const SaveRequest& request) {
   const OIIO::ImageSpec spec = specification(request);
   // The proxy outlives its user, which may still write to it when it is closed by an exception.
   OIIO::Filesystem::IOVecOutput memory;
-  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin_name(request.kind));
+  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(row_of(request.kind).plugin);
   if (!output) fail(OIIO::geterror());
   output->threads(thread_count());
   // The PNG writer does not notice a full disk, and the JPEG writer ends the program: these get none to write

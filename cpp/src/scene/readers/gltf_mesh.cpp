@@ -14,7 +14,7 @@
 #include "gltf_document.hpp"
 #include "gltf_mesh.hpp"
 #include "gltf_nodes.hpp"
-#include "loaded_mesh.hpp"
+#include "readers.hpp"
 
 namespace mirrorbake {
 namespace {

@@ -15,6 +15,7 @@
 #include "gltf_nodes.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
+#include "readers.hpp"
 #include "scene_builder.hpp"
 
 namespace mirrorbake {

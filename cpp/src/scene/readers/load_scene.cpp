@@ -1,8 +1,6 @@
-#include "loaded_mesh.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
-#include "mirrorbake/scene/load.hpp"
-#include "scene_builder.hpp"
+#include "readers.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -21,12 +19,7 @@ void check_options(const SceneOptions& options) {
 
 LoadedScene load_scene(const std::string& path, const SceneOptions& options) {
   check_options(options);
-  const std::string extension = lower_extension(path);
-  const bool is_gltf = extension == ".gltf" || extension == ".glb";
-  if (!is_gltf && extension != ".obj") {
-    throw FileError(path, "has the extension '" + extension + "', expected .obj, .gltf or .glb");
-  }
-  LoadedScene loaded = is_gltf ? read_gltf_scene(path, options) : read_obj_scene(path, options);
+  LoadedScene loaded = reader_of(path).scene(path, options);
   try {
     validate(loaded.scene);
   } catch (const InvalidArgument& error) {

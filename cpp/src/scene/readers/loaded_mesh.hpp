@@ -37,16 +37,12 @@ struct ObjContent {
   std::uint64_t colors = 0;       ///< vertices that have one
 };
 
-/// `origin` becomes the mesh's zero.
-LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjContent* content = nullptr,
-                    glm::dvec3 origin = glm::dvec3(0.0));
-LoadedMesh read_gltf(const std::string& path, const MeshLimits& limits, glm::dvec3 origin = glm::dvec3(0.0));
+/// As read_obj, with what else the file says.
+LoadedMesh read_obj_content(const std::string& path, const MeshLimits& limits, glm::dvec3 origin,
+                            ObjContent& content);
 
 /// Throws InvalidArgument unless an origin is usable.
 void check_origin(glm::dvec3 origin);
-
-/// Extension of a file name in lower case, with its dot.
-std::string lower_extension(const std::string& path);
 
 /// Throws FileError naming the first vertex, from number `first` on, that is not finite or beyond what a
 /// scene accepts.

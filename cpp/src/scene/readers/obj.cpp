@@ -18,6 +18,7 @@
 #include "mtl.hpp"
 #include "obj_builder.hpp"
 #include "obj_libraries.hpp"
+#include "readers.hpp"
 #include "text_lines.hpp"
 
 namespace mirrorbake {
@@ -199,13 +200,16 @@ std::vector<std::string> library_files(const std::string& path, std::string name
   return files;
 }
 
-LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, ObjContent* content,
-                    glm::dvec3 origin) {
-  ObjContent ignored;
-  LoadedMesh loaded =
-      ObjReader(path, limits, content != nullptr ? *content : ignored, origin).read(read_file(path));
+LoadedMesh read_obj_content(const std::string& path, const MeshLimits& limits, glm::dvec3 origin,
+                            ObjContent& content) {
+  LoadedMesh loaded = ObjReader(path, limits, content, origin).read(read_file(path));
   check_positions(path, loaded.mesh.positions);
   return loaded;
+}
+
+LoadedMesh read_obj(const std::string& path, const MeshLimits& limits, glm::dvec3 origin) {
+  ObjContent ignored;
+  return read_obj_content(path, limits, origin, ignored);
 }
 
 }  // namespace mirrorbake

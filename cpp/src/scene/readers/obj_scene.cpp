@@ -15,6 +15,7 @@
 #include "mirrorbake/core/text.hpp"
 #include "mtl.hpp"
 #include "obj_libraries.hpp"
+#include "readers.hpp"
 #include "scene_builder.hpp"
 
 namespace mirrorbake {
@@ -39,7 +40,7 @@ class ObjScene {
 
   LoadedScene read() {
     ObjContent used;
-    LoadedMesh mesh = read_obj(path_, options_.meshes, &used, options_.origin);
+    LoadedMesh mesh = read_obj_content(path_, options_.meshes, options_.origin, used);
     drop_degenerate(path_, mesh);
     warnings_.add("lines are not supported", used.lines);
     warnings_.add("points are not supported", used.points);

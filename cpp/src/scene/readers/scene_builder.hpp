@@ -73,7 +73,4 @@ glm::vec3 radiance(const std::string& path, const std::string& what, glm::vec3 v
 std::vector<Object> split_into_objects(LoadedMesh&& loaded, const std::vector<Material>& materials,
                                        const std::map<int, int>& material_of);
 
-LoadedScene read_gltf_scene(const std::string& path, const SceneOptions& options);
-LoadedScene read_obj_scene(const std::string& path, const SceneOptions& options);
-
 }  // namespace mirrorbake

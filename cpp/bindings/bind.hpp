@@ -74,6 +74,25 @@ void show(nb::class_<T, Extra...>& type, std::vector<const char*> attributes) {
   });
 }
 
+/// A constructor that sets attributes by keyword; `signature` is what type checkers see.
+template <typename T, typename... Extra>
+void keyword_init(nb::class_<T, Extra...>& type, const std::string& signature) {
+  type.def(
+      "__init__",
+      [](nb::pointer_and_handle<T> self, const nb::kwargs& values) {
+        new (self.p) T();
+        nb::inst_mark_ready(self.h);
+        for (auto [attribute, value] : values) {
+          if (!nb::hasattr(self.h, attribute)) {
+            throw nb::type_error(
+                ("unexpected keyword argument '" + nb::cast<std::string>(attribute) + "'").c_str());
+          }
+          nb::setattr(self.h, attribute, value);
+        }
+      },
+      nb::sig(signature.c_str()));
+}
+
 /// Lets a struct of plain values be pickled and copied: `attributes` are all that it has, each of which can
 /// be set, and its default value is a valid one.
 template <typename T, typename... Extra>

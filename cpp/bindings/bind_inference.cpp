@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "bind.hpp"
+#include "mirrorbake/core/text.hpp"
 #include "mirrorbake/envmap/cube_pyramid.hpp"
 #include "mirrorbake/envmap/texel_topology.hpp"
 #include "mirrorbake/inference/map_solver.hpp"
@@ -181,28 +182,28 @@ float32 (rows, C). `pixel_samples` as SurfaceSamples has it stands in for sample
 
 void bind_solver_options(nb::module_& m) {
   nb::class_<SolveOptions> solve_options(m, "SolveOptions", "Weights of the regulariser and when to stop.");
+  std::vector<const char*> attributes;
+  std::string keywords = "def __init__(self, *, ";
+  nb::list weights;
+  for (const SolveWeight& weight : kSolveWeights) {
+    solve_options.def_prop_rw(
+        weight.name, [value = weight.value](const SolveOptions& options) { return options.*value; },
+        [value = weight.value](SolveOptions& options, float number) { options.*value = number; }, weight.help,
+        nb::for_setter(nb::name(weight.name)));
+    attributes.push_back(weight.name);
+    keywords += std::string(weight.name) + ": float = " + text_of(SolveOptions{}.*weight.value) + ", ";
+    weights.append(weight.name);
+  }
+  keywords += "tolerance: float = " + text_of(SolveOptions{}.tolerance) +
+              ", max_iterations: int = " + std::to_string(SolveOptions{}.max_iterations) + ") -> None";
   solve_options
-      .def(
-          "__init__",
-          [](SolveOptions* self, float smoothness, float level_agreement, float prior_weight, float tolerance,
-             int max_iterations) {
-            new (self) SolveOptions{smoothness, level_agreement, prior_weight, tolerance, max_iterations};
-          },
-          nb::kw_only(), nb::arg("smoothness") = SolveOptions{}.smoothness,
-          nb::arg("level_agreement") = SolveOptions{}.level_agreement,
-          nb::arg("prior_weight") = SolveOptions{}.prior_weight,
-          nb::arg("tolerance") = SolveOptions{}.tolerance,
-          nb::arg("max_iterations") = SolveOptions{}.max_iterations)
-      .def_rw("smoothness", &SolveOptions::smoothness,
-              "Weight of squared differences of neighbouring texels, >= 0.")
-      .def_rw("level_agreement", &SolveOptions::level_agreement,
-              "Weight of a texel's squared difference from the mean of its children, >= 0.")
-      .def_rw("prior_weight", &SolveOptions::prior_weight,
-              "Weight of the squared difference from the prior, >= 0.")
       .def_rw("tolerance", &SolveOptions::tolerance,
               "Stop when the gradient has shrunk to this fraction, > 0.")
       .def_rw("max_iterations", &SolveOptions::max_iterations, "0 to 100000.");
-  record(solve_options, {"smoothness", "level_agreement", "prior_weight", "tolerance", "max_iterations"});
+  attributes.insert(attributes.end(), {"tolerance", "max_iterations"});
+  keyword_init(solve_options, keywords);
+  record(solve_options, attributes);
+  m.attr("SOLVE_WEIGHTS") = nb::tuple(weights);
 
   nb::class_<SolveReport> solve_report(m, "SolveReport", "What a solve did.");
   solve_report.def_ro("iterations", &SolveReport::iterations)

@@ -27,9 +27,9 @@ void check_magnitude(const char* name, std::span<const float> values) {
 }
 
 void check(const SolveOptions& options) {
-  check_at_least("smoothness", static_cast<double>(options.smoothness), 0.0);
-  check_at_least("level_agreement", static_cast<double>(options.level_agreement), 0.0);
-  check_at_least("prior_weight", static_cast<double>(options.prior_weight), 0.0);
+  for (const SolveWeight& weight : kSolveWeights) {
+    check_at_least(weight.name, static_cast<double>(options.*weight.value), 0.0);
+  }
   if (!(options.tolerance > 0.0F && options.tolerance < 1.0F)) {
     throw InvalidArgument("tolerance", text_of(options.tolerance), "a number in (0, 1)");
   }

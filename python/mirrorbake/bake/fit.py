@@ -37,9 +37,7 @@ class FitView:
 def solve_options(infer: Infer) -> _core.SolveOptions:
     """Return the solver's settings of a scene file."""
     return _core.SolveOptions(
-        smoothness=infer.smoothness,
-        level_agreement=infer.level_agreement,
-        prior_weight=infer.prior_weight,
+        **{name: getattr(infer, name) for name in _core.SOLVE_WEIGHTS},
         tolerance=infer.tolerance,
         max_iterations=infer.iterations,
     )

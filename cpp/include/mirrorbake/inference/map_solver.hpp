@@ -24,6 +24,23 @@ struct SolveOptions {
   int max_iterations = 600;  ///< of all rounds together, 0…100000
 };
 
+/// A weight of SolveOptions, which is not below 0.
+struct SolveWeight {
+  const char* name;
+  float SolveOptions::*value;
+  const char* help;
+};
+
+/// All of them, for who checks or names them.
+inline constexpr std::array kSolveWeights{
+    SolveWeight{"smoothness", &SolveOptions::smoothness,
+                "Weight of squared differences of neighbouring texels, >= 0."},
+    SolveWeight{"level_agreement", &SolveOptions::level_agreement,
+                "Weight of a texel's squared difference from the mean of its children, >= 0."},
+    SolveWeight{"prior_weight", &SolveOptions::prior_weight,
+                "Weight of the squared difference from the prior, >= 0."},
+};
+
 struct SolveReport {
   int iterations = 0;      ///< of conjugate gradients, all rounds together
   int rounds = 0;          ///< after each of them the map is put within its bounds

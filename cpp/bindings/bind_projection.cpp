@@ -73,6 +73,10 @@ alike.)");
       "face_count", [](const std::string& projection) { return face_count(parse_projection(projection)); },
       nb::arg("projection"), "Faces of a map: 6 of a cube, 2 of dual paraboloids, else 1.");
   m.def(
+      "natural_aspect",
+      [](const std::string& projection) { return natural_aspect(parse_projection(projection)); },
+      nb::arg("projection"), "Width over height that makes texels roughly square: 2 of panoramas, else 1.");
+  m.def(
       "solid_angle_density",
       [](const std::string& projection, int face, double x, double y) {
         const Projection p = parse_projection(projection);

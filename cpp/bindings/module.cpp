@@ -5,6 +5,7 @@ namespace mirrorbake::bindings {
 // One function per module, each in bind_<module>.cpp; they only map names.
 void bind_core(nb::module_& m);
 void bind_proxy(nb::module_& m);
+void bind_proxy_fits(nb::module_& m);
 void bind_envmap(nb::module_& m);
 void bind_image(nb::module_& m);
 void bind_material(nb::module_& m);
@@ -27,6 +28,7 @@ NB_MODULE(_core, m) {
   m.doc() = "Compiled part of mirrorbake. Use it through the package `mirrorbake`.";
   bind_core(m);
   bind_proxy(m);
+  bind_proxy_fits(m);
   bind_image(m);
   bind_material(m);
   bind_mesh(m);

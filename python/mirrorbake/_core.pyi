@@ -1152,6 +1152,19 @@ class ShellRule:
     ITSELF: Final[int] = ...
     """The reflector, as an entry of `objects`."""
 
+    @property
+    def has_limits(self) -> bool:
+        """
+        Whether it holds some of the places of its things alone, so that those may be met again
+        behind.
+        """
+
+    def holds(self, objects: NDArray[numpy.int32], distances: NDArray[numpy.float32], reflector: int) -> NDArray[numpy.uint8]:
+        """
+        1 where the rule holds what a ray meets, else 0: objects' numbers (n,), -1 for a light, at
+        distances (n,) along the ray, metres.
+        """
+
     def __eq__(self, other: object, /) -> bool: ...
 
     def __repr__(self) -> str: ...
@@ -1380,6 +1393,11 @@ def texel_solid_angles(projection: str, width: int, height: int) -> NDArray[nump
 
 def face_count(projection: str) -> int:
     """Faces of a map: 6 of a cube, 2 of dual paraboloids, else 1."""
+
+def natural_aspect(projection: str) -> int:
+    """
+    Width over height that makes texels roughly square: 2 of panoramas, else 1.
+    """
 
 def solid_angle_density(projection: str, face: int, x: float, y: float) -> float:
     """
@@ -1700,7 +1718,7 @@ def display_row_weights(matrix: RenderingMatrix, samples_per_pixel: int, target:
 class SolveOptions:
     """Weights of the regulariser and when to stop."""
 
-    def __init__(self, *, smoothness: float = 0.0010000000474974513, level_agreement: float = 0.0010000000474974513, prior_weight: float = 0.0010000000474974513, tolerance: float = 0.0010000000474974513, max_iterations: int = 600) -> None: ...
+    def __init__(self, *, smoothness: float = 0.001, level_agreement: float = 0.001, prior_weight: float = 0.001, tolerance: float = 0.001, max_iterations: int = 600) -> None: ...
 
     @property
     def smoothness(self) -> float:
@@ -1744,6 +1762,8 @@ class SolveOptions:
     def __getstate__(self) -> dict: ...
 
     def __setstate__(self, arg: dict, /) -> None: ...
+
+SOLVE_WEIGHTS: tuple = ('smoothness', 'level_agreement', 'prior_weight')
 
 class SolveReport:
     """What a solve did."""

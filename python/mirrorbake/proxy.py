@@ -74,28 +74,28 @@ def hull_triangles(
     return _core.hull_triangles(positions, triangles, tolerance).astype(np.bool_)
 
 
+SHAPES: Mapping[str, tuple[str, ...]] = {
+    "infinite": (),
+    "box": ("centre", "half_extent", "axes"),
+    "ellipsoid": ("centre", "radii", "axes"),
+    "hemisphere": ("centre", "radius", "axes"),
+}
+"""What tells a shape besides the map's origin: attributes of a `Proxy`, and arguments of the constructor that
+bears the shape's name."""
+
+
 def proxy_from_attributes(description: Mapping[str, Any]) -> _core.Proxy:
     """Return the proxy that a PEM's attributes describe."""
-    shape, origin = description["shape"], description["origin"]
-    if shape == "infinite":
-        return _core.Proxy.infinite(origin)
-    centre, axes = description["centre"], np.array(description["axes"], np.float32)
-    if shape == "box":
-        return _core.Proxy.box(centre, description["half_extent"], origin, axes)
-    if shape == "hemisphere":
-        return _core.Proxy.hemisphere(centre, description["radius"], origin, axes)
-    return _core.Proxy.ellipsoid(centre, description["radii"], origin, axes)
+    values = {name: description[name] for name in ("origin", *SHAPES[description["shape"]])}
+    if "axes" in values:
+        values["axes"] = np.array(values["axes"], np.float32)
+    proxy: _core.Proxy = getattr(_core.Proxy, description["shape"])(**values)
+    return proxy
 
 
 def proxy_to_attributes(proxy: _core.Proxy) -> dict[str, Any]:
     """Inverse of `proxy_from_attributes`."""
-    fields = {
-        "infinite": (),
-        "box": ("centre", "half_extent", "axes"),
-        "ellipsoid": ("centre", "radii", "axes"),
-        "hemisphere": ("centre", "radius", "axes"),
-    }[proxy.kind]
     description: dict[str, Any] = {"shape": proxy.kind}
-    for field in (*fields, "origin"):
+    for field in (*SHAPES[proxy.kind], "origin"):
         description[field] = np.asarray(getattr(proxy, field)).astype(float).tolist()
     return description

@@ -78,12 +78,13 @@ class Resampler:
 
 
 def height_and_width(projection: str, size: int | tuple[int, int]) -> tuple[int, int]:
+    aspect = _core.natural_aspect(projection)
     try:
         if isinstance(size, tuple | list):
             height, width = (index(side) for side in size)
         else:
             height = index(size)
-            width = 2 * height if projection in ("latlong", "equal_area") else height
+            width = aspect * height
     except (TypeError, ValueError):
         raise _core.InvalidArgument(f"size is {size!r}, expected a height, or (height, width)") from None
     if max(height, width) > _MAX_SIDE:

@@ -12,7 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from mirrorbake import _core
 from mirrorbake.errors import StoreError
-from mirrorbake.proxy import proxy_from_attributes
+from mirrorbake.proxy import SHAPES, proxy_from_attributes
+from mirrorbake.scene.config_shells import ShellRule
 from mirrorbake.scene.config_values import MAX_IMAGE_SIDE, MAX_MAP_SIZE
 
 FORMAT_VERSION = 5
@@ -31,7 +32,7 @@ class _Model(BaseModel):
 class ProxyAttributes(_Model):
     """A shape, as `mirrorbake.proxy.proxy_to_attributes` returns it."""
 
-    shape: Literal["infinite", "box", "ellipsoid", "hemisphere"]
+    shape: str
     origin: Triple
     centre: Triple | None = None
     half_extent: Triple | None = None
@@ -41,6 +42,8 @@ class ProxyAttributes(_Model):
 
     @model_validator(mode="after")
     def _is_a_shape(self) -> ProxyAttributes:
+        if self.shape not in SHAPES:
+            raise ValueError(f"no such shape: {self.shape}; expected {', '.join(SHAPES)}")
         try:
             proxy_from_attributes(self.model_dump(exclude_none=True))
         except KeyError as missing:
@@ -74,14 +77,6 @@ class ShellAttributes(_Model):
     map: Annotated[str, Field(min_length=1, max_length=2000)]
     polygons: Literal["all", "off hull"]
     moves: bool
-
-
-class RuleAttributes(_Model):
-    """What a shell holds of reflected rays."""
-
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
-    objects: Annotated[list[Annotated[str, Field(min_length=1, max_length=1000)]], Field(max_length=10_000)]
-    nearer_than: Annotated[Number, Field(gt=0)] | None
 
 
 class PartAttributes(_Model):
@@ -136,7 +131,7 @@ class Attributes(_Model):
     ]
     origin: Triple
     space: Annotated[list[AxisAttributes], Field(max_length=8)]
-    shells: Annotated[list[RuleAttributes], Field(min_length=1, max_length=_core.MOST_SHELLS)]
+    shells: Annotated[list[ShellRule], Field(min_length=1, max_length=_core.MOST_SHELLS)]
     parts: Annotated[list[PartAttributes], Field(min_length=1, max_length=MAX_PARTS)]
     maps: Annotated[list[MapAttributes], Field(min_length=1, max_length=64 * MAX_PARTS)]
     static: StaticAttributes

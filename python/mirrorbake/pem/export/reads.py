@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.scene.pose import Pose
+from mirrorbake.scene.config_axes import arranged
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,7 +39,7 @@ def texels_read(pem: OpenedPem, sample: int) -> list[NDArray[np.bool_]]:
     read = [np.zeros(header.topology.texels) for _ in header.maps]
     for point, camera in _views(pem, sample):
         here = stage.at(point)
-        pose = Pose.of(config, header.space.scene_coordinates(point).get("motion", 0.0))
+        pose = arranged(config, header.space.scene_coordinates(point)).pose
         seen = here.tracer.trace_visibility(camera, here.built.reflector, here.options, pem.run_time.places)
         for number, part in enumerate(header.parts):
             for shell in part.shells:

@@ -19,11 +19,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.pem.export.blocks import blocks_of, pixels_of
 from mirrorbake.pem.export.images import ImageFormat
 from mirrorbake.pem.export.map_sets import run_time_attributes
 from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
-from mirrorbake.pem.export.radiance_code import RadianceCode
+from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_atlas
 from mirrorbake.pem.export.source import ExportSource, MapEntry, Part, Shell
 from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.pem.pyramid import FACES, Projection, topology_of
@@ -35,6 +36,8 @@ from mirrorbake.scene.pose import Pose, rotation_matrix
 from mirrorbake.viewer.export import write_folder
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from mirrorbake.arrays import FloatArray
 
 WIDTH, HEIGHT, FOV = 320, 240, 30.0
@@ -66,6 +69,8 @@ class Case:
     segments: int = 40
     """Around the ring; 320 make triangles smaller than a pixel."""
     map_size: int = 32
+    trimmed: bool = False
+    """Of a sample's texels every second half face alone are its own; the static set has the others."""
 
 
 MAPS = (4, 3, 3, 4)
@@ -148,6 +153,7 @@ def _cube_cases() -> list[Case]:
             segments=320,
             map_size=128,
         ),
+        Case("trimmed", _core.Proxy.infinite(origin), local, schlick, trimmed=True, fade_degrees=10.0),
         Case("fading", _core.Proxy.infinite(origin), local, schlick, fade_degrees=10.0),
     ]
 
@@ -296,6 +302,7 @@ class CasePem:
 
     def __init__(self, projection: Projection = "cube", size: int = 32) -> None:
         self.projection = projection
+        self.size = size
         self.code = RadianceCode.for_range(2.0, 3.6)
         # The last "sample" is the static set.
         self._maps = [
@@ -310,8 +317,20 @@ class CasePem:
     def pyramid(self, sample: int, number: int) -> FloatArray:
         return self._maps[sample][number]
 
-    def rounded(self, code: RadianceCode, sample: int, number: int) -> FloatArray:
-        pyramid = self._maps[sample][number].copy()
+    def reads(self, sample: int) -> list[NDArray[np.bool_]]:
+        return [np.arange(len(pyramid)) // 512 % 2 == 0 for pyramid in self._maps[sample]]
+
+    def whole(self, sample: int, number: int) -> FloatArray:
+        """A trimmed sample as the page puts it together."""
+        size = self.size
+        blocks = blocks_of(self.reads(sample)[number], size, self.projection)
+        own = pixels_of(blocks, *atlas_shape(size, self.projection))[..., None].astype(np.uint8)
+        return np.where(
+            from_atlas(own, size, self.projection) > 0, self._maps[sample][number], self._maps[-1][number]
+        )
+
+    def rounded(self, code: RadianceCode, sample: int, number: int, *, trimmed: bool = False) -> FloatArray:
+        pyramid = self.whole(sample, number) if trimmed else self._maps[sample][number].copy()
         pyramid[:, :3] = code.decode(code.encode(pyramid[:, :3]))
         if pyramid.shape[1] == 4:
             pyramid[:, 3] = np.rint(pyramid[:, 3] * 255.0) / 255.0
@@ -337,7 +356,7 @@ def case_source(case: Case, scene: Scene, pem: CasePem) -> ExportSource:
         maps=tuple(MapEntry(f"map {m}", case.map_size, opaque=MAPS[m] == 3) for m in range(count)),
         pyramid=pem.pyramid,
         static_maps=None if case.fade_degrees is None else tuple(pem.static_maps[:count]),
-        reads=None,
+        reads=(lambda sample: pem.reads(sample)[:count]) if case.trimmed else None,
         fade_degrees=case.fade_degrees,
         still=lambda sample: np.full((HEIGHT, WIDTH, 3), 0.2 + 0.2 * sample, np.float32),
         mesh=scene.mesh,
@@ -379,8 +398,8 @@ def reference(case: Case, pem: CasePem, code: RadianceCode, t: float, raised: fl
     fade = np.float32(1.0 if case.fade_degrees is None else fade_weight(case.fade_degrees, raised))
 
     def blended(number: int) -> FloatArray:
-        a = pem.rounded(code, first, number)
-        b = pem.rounded(code, first + 1, number)
+        a = pem.rounded(code, first, number, trimmed=case.trimmed)
+        b = pem.rounded(code, first + 1, number, trimmed=case.trimmed)
         static = pem.rounded(code, len(PARAMETERS), number)
         return fade * ((1 - weight) * a + weight * b) + (1 - fade) * static
 
@@ -425,7 +444,7 @@ def write_case(case: Case, folder: Path, image_format: ImageFormat) -> None:
 
 def main(out: Path) -> None:
     for case in cases():
-        write_case(case, out / case.name, ImageFormat(exact=True))
+        write_case(case, out / case.name, ImageFormat(exact=not case.trimmed))
     write_case(cases()[1], out / "avif", ImageFormat(exact=False))
 
 

@@ -25,6 +25,8 @@ export class App {
   private dirty = true;
   private lastFrame = 0;
   private meanFrame = 0;
+  /// Set when the graphics card is done with the last frame.
+  private fence: { gl: WebGL2RenderingContext; sync: WebGLSync; began: number } | null = null;
   private lost = false;
   private headset: XRSession | null = null;
   private linkTimer = 0;
@@ -298,6 +300,8 @@ export class App {
     requestAnimationFrame((next) => this.tick(next));
     const { scene } = this;
     if (!scene || this.lost || this.headset) return;
+    // Browsers take frames faster than slow graphics cards draw them: wait, or the picture lags behind the hand.
+    if (!this.isFrameDone(now)) return;
     const elapsed = now - this.lastFrame;
     this.lastFrame = now;
     if (this.playing) this.advance(scene, elapsed / 1000);
@@ -308,12 +312,32 @@ export class App {
     this.dirty = false;
     scene.prepare(this.settings, this.velocity);
     this.paint();
-    if (this.playing && elapsed < 1000) {
-      this.meanFrame = this.meanFrame === 0 ? elapsed : 0.9 * this.meanFrame + 0.1 * elapsed;
-      this.controls.fps.textContent = `${this.meanFrame.toFixed(1)} ms`;
-    }
+    const { gl } = scene.renderer;
+    const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (sync) this.fence = { gl, sync, began: now };
+    gl.flush();
     this.controls.show(this.settings, scene.point(this.settings), this.controls.canvas.clientWidth);
     this.showProgress(scene);
+  }
+
+  /// Whether the last frame is drawn; then its time counts, while playing.
+  private isFrameDone(now: number): boolean {
+    if (!this.fence) return true;
+    const { gl, sync, began } = this.fence;
+    if (!gl.isContextLost() && gl.getSyncParameter(sync, gl.SYNC_STATUS) === gl.UNSIGNALED) return false;
+    gl.deleteSync(sync);
+    this.fence = null;
+    if (this.playing) {
+      const took = now - began;
+      this.meanFrame = this.meanFrame === 0 ? took : 0.9 * this.meanFrame + 0.1 * took;
+      this.controls.fps.textContent = `${this.meanFrame.toFixed(1)} ms`;
+    }
+    return true;
+  }
+
+  /// Whether what is seen is what was last asked for.
+  get isDrawn(): boolean {
+    return !this.dirty && this.fence === null;
   }
 
   private advance(scene: Scene, seconds: number): void {

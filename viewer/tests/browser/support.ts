@@ -105,10 +105,5 @@ export async function open(
 
 /// Waits until the page has drawn what it was last told to.
 export async function settle(page: Page): Promise<void> {
-  await page.evaluate(
-    () =>
-      new Promise<void>((resolve) => {
-        requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(() => resolve())));
-      }),
-  );
+  await page.waitForFunction(() => window.mirrorbake.isDrawn, undefined, { timeout: 60000 });
 }

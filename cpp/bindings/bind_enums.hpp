@@ -125,6 +125,7 @@ MIRRORBAKE_NAME_ENUM(ResampleFilter, "filter", "automatic", "area", "bilinear", 
 MIRRORBAKE_NAME_ENUM(RoughnessScale, "roughness", "squared", "linear");
 MIRRORBAKE_NAME_ENUM(SampleFilter, "filter", "nearest", "bilinear", "trilinear", "ewa");
 MIRRORBAKE_NAME_ENUM(SpecularLobe, "lobe", "mirror", "ggx", "phong");
+MIRRORBAKE_NAME_ENUM(SurfaceSide, "side", "front", "back");
 MIRRORBAKE_NAME_ENUM(TextureWrap, "wrap", "repeat", "clamp", "mirror");
 MIRRORBAKE_NAME_ENUM(Transfer, "transfer", "automatic", "srgb", "linear");
 

@@ -82,6 +82,8 @@ when no light was traced.)");
   def_vectors<&S::fresnel>(c, "fresnel", "(n, 3): Fresnel reflectance F of the first bounce.");
   def_vectors<&S::albedo>(c, "albedo", "(n, 3): diffuse albedo, times (1 - F) under a coat.");
   def_vectors<&S::emission>(c, "emission", "(n, 3): radiance of the surface's own; (0, 3): none.");
+  def_scalars<&S::back>(c, "back",
+                        "(n,) uint8: 1 where the eye sees the back of the triangle; (0,): nowhere.");
   def_vectors<&S::diffuse>(c, "diffuse", "(n, 3): radiance D that the body reflects and emits.");
   c.def_prop_ro(
       "shells",

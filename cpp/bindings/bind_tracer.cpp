@@ -154,18 +154,18 @@ tuple[NDArray[numpy.float32], NDArray[numpy.int32]])">(),
           "Distance and object of `intersect` alone, which is faster.")
       .def(
           "vertex_irradiance",
-          [](const Tracer& tracer, int object, int rays, std::uint64_t seed) {
+          [](const Tracer& tracer, int object, int rays, std::uint64_t seed, SurfaceSide side) {
             std::vector<glm::vec3> irradiance;
             {
               nb::gil_scoped_release released;
-              irradiance = tracer.vertex_irradiance(object, rays, seed);
+              irradiance = tracer.vertex_irradiance(object, rays, seed, side);
             }
             return vectors_to_numpy(std::move(irradiance));
           },
-          nb::arg("object"), nb::arg("rays") = 256, nb::arg("seed") = 0,
-          signature<R"(def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...) ->
-NDArray[numpy.float32])">(),
-          "Irradiance at every vertex of an object's front, (vertices, 3), all light included.");
+          nb::arg("object"), nb::arg("rays") = 256, nb::arg("seed") = 0, nb::arg("side") = SurfaceSide::front,
+          signature<R"(def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...,
+side: typing.Literal['front', 'back'] = ...) -> NDArray[numpy.float32])">(),
+          "Irradiance on one side of an object at every vertex, (vertices, 3), all light included.");
 }
 
 void bind_camera(nb::module_& m) {

@@ -981,6 +981,12 @@ class SurfaceSamples:
         """(n, 3): radiance of the surface's own; (0, 3): none."""
 
     @property
+    def back(self) -> Annotated[NDArray[numpy.uint8], dict(writable=False)]:
+        """
+        (n,) uint8: 1 where the eye sees the back of the triangle; (0,): nowhere.
+        """
+
+    @property
     def diffuse(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
         """(n, 3): radiance D that the body reflects and emits."""
 
@@ -1368,9 +1374,9 @@ class Tracer:
     def intersect_distance(self, origins: NDArray[numpy.float32], directions: NDArray[numpy.float32], hidden: Sequence[int] = ...) -> tuple[NDArray[numpy.float32], NDArray[numpy.int32]]:
         """Distance and object of `intersect` alone, which is faster."""
 
-    def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...) -> NDArray[numpy.float32]:
+    def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ..., side: Literal['front', 'back'] = ...) -> NDArray[numpy.float32]:
         """
-        Irradiance at every vertex of an object's front, (vertices, 3), all light included.
+        Irradiance on one side of an object at every vertex, (vertices, 3), all light included.
         """
 
 def points_from_directions(projection: str, directions: NDArray[numpy.float32]) -> tuple[NDArray[numpy.int32], NDArray[numpy.float32]]:
@@ -1972,10 +1978,10 @@ def shell_light(samples: SurfaceSamples, map: ShellMap, run_time: RunTimeModel =
     yet times F, and alpha, which is 0 where the shell leaves the sample's triangle out.
     """
 
-def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], vertex_irradiance: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
+def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], vertex_irradiance: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], back_irradiance: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None) -> NDArray[numpy.float32]:
     """
     Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex
-    (V, 3).
+    (V, 3). Samples that see the back of a triangle take that of `back_irradiance`, if it is given.
     """
 
 class ProbedMatrix:

@@ -117,7 +117,12 @@ std::vector<glm::vec4> shell_light(const SurfaceSamples& samples, const ShellMap
 
 std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
                                                std::span<const glm::uvec3> triangles,
-                                               std::span<const glm::vec3> vertex_irradiance) {
+                                               std::span<const glm::vec3> vertex_irradiance,
+                                               std::span<const glm::vec3> back_irradiance) {
+  if (!back_irradiance.empty()) {
+    check_length("back_irradiance", back_irradiance.size(), vertex_irradiance.size());
+    if (!samples.back.empty()) check_length("samples.back", samples.back.size(), samples.size());
+  }
   for (const glm::uvec3& triangle : triangles) {
     if (std::max({triangle.x, triangle.y, triangle.z}) >= vertex_irradiance.size()) {
       throw InvalidArgument("vertex_irradiance", std::to_string(vertex_irradiance.size()) + " entries",
@@ -133,8 +138,10 @@ std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
       }
       const glm::uvec3 triangle = triangles[samples.triangle[i]];
       const glm::vec2 b = samples.barycentric[i];
-      const glm::vec3 irradiance = (1.0F - b.x - b.y) * vertex_irradiance[triangle.x] +
-                                   b.x * vertex_irradiance[triangle.y] + b.y * vertex_irradiance[triangle.z];
+      const bool is_back = !back_irradiance.empty() && !samples.back.empty() && samples.back[i] != 0;
+      const std::span<const glm::vec3> side = is_back ? back_irradiance : vertex_irradiance;
+      const glm::vec3 irradiance =
+          (1.0F - b.x - b.y) * side[triangle.x] + b.x * side[triangle.y] + b.y * side[triangle.z];
       diffuse[i] = samples.albedo[i] * irradiance * std::numbers::inv_pi_v<float>;
       if (!samples.emission.empty()) diffuse[i] += samples.emission[i];
     }

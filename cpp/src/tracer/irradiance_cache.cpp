@@ -24,6 +24,12 @@ constexpr int kLaterShare = 4;
 constexpr std::uint32_t kStartPoints = 16;
 // Corners of a flat-shaded mesh share a slot if their faces differ by less than acos(0.999) = 2.6°.
 constexpr float kSameFace = 0.999F;
+// Slots of an object up to which each takes all of its rays; beyond it the object's rays are as many as these
+// have, down to a share that the mean with a vertex and its ring of six makes up for.
+constexpr float kSlotsWithAllRays = 16384.0F;
+constexpr float kLeastShare = 0.2F;
+constexpr int kLeastRays = 8;
+constexpr int kLeastLaterRays = 4;
 
 }  // namespace
 
@@ -39,6 +45,7 @@ IrradianceCache::IrradianceCache(const World& world, const TracerOptions& option
 
 void IrradianceCache::assign_slots(const World& world) {
   slot_of_corner_.resize(world.scene.objects.size());
+  ray_share_.assign(world.scene.objects.size(), 1.0F);
   std::uint32_t slots = 0;
   for (std::size_t o = 0; o < world.scene.objects.size(); ++o) {
     const Object& object = world.scene.objects[o];
@@ -50,6 +57,7 @@ void IrradianceCache::assign_slots(const World& world) {
     }
     const TriangleMesh& mesh = object.mesh;
     std::vector<std::uint32_t>& slot = slot_of_corner_[o];
+    const std::uint32_t before = slots;
     slot.resize(3 * mesh.triangles.size(), kNoSlot);
     if (!mesh.normals.empty()) {
       std::vector<std::uint32_t> slot_of_vertex(mesh.positions.size(), kNoSlot);
@@ -80,6 +88,7 @@ void IrradianceCache::assign_slots(const World& world) {
         slot[i] = entries[e].slot;
       }
     }
+    ray_share_[o] = std::clamp(kSlotsWithAllRays / static_cast<float>(slots - before), kLeastShare, 1.0F);
   }
 
   first_corner_.assign(slots + 1, 0);
@@ -125,9 +134,11 @@ IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std
   int traced = 0;
   int dark = 0;
   int nothing = 0;
+  // A slot with a share of the rays is given up as early in them as others are.
+  const int probe_rays = rays_of(slot, kProbeRays, kLeastRays);
   for (int r = 0; r < rays; ++r) {
     const bool hopeless = dark == traced || (side == 1 && dark + nothing == traced);
-    if (r == kProbeRays && hopeless) {
+    if (r == probe_rays && hopeless) {
       result.given_up = true;
       break;
     }
@@ -173,19 +184,49 @@ void IrradianceCache::gather(const World& world, const TracerOptions& options) {
         for (std::size_t slot = begin; slot < end; ++slot) {
           if (given_up[side][slot] != 0) continue;
           poll_interrupt();
-          const SlotGather gathered = pass == 0 ? gather_slot(world, slot, side, rays, direct)
-                                                : gather_slot(world, slot, side, rays, indirect);
+          const int own = rays_of(slot, rays, pass == 0 ? kLeastRays : kLeastLaterRays);
+          const SlotGather gathered = pass == 0 ? gather_slot(world, slot, side, own, direct)
+                                                : gather_slot(world, slot, side, own, indirect);
           found.side[side][slot] = gathered.irradiance;
           if (pass > 0) continue;
           buried[side][slot] = gathered.buried ? 1 : 0;
           given_up[side][slot] = gathered.given_up ? 1 : 0;
         }
       });
+      share_rays(found.side[side], buried[side]);
       fill_buried(found.side[side], buried[side]);
       for (std::size_t i = 0; i < slots; ++i) total_.side[side][i] += found.side[side][i];
     }
     previous = std::move(found);
   }
+}
+
+int IrradianceCache::rays_of(std::size_t slot, int rays, int least) const {
+  const float share = ray_share_[corners_[first_corner_[slot]].object];
+  return std::max(static_cast<int>(share * static_cast<float>(rays)), std::min(rays, least));
+}
+
+void IrradianceCache::share_rays(std::vector<glm::vec3>& values,
+                                 const std::vector<std::uint8_t>& buried) const {
+  const std::vector<glm::vec3> gathered = values;
+  parallel_for(values.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t slot = begin; slot < end; ++slot) {
+      const std::uint32_t first = first_corner_[slot];
+      if (buried[slot] != 0 || ray_share_[corners_[first].object] == 1.0F) continue;
+      glm::vec3 sum(0.0F);
+      int count = 0;
+      for (std::uint32_t c = first; c < first_corner_[slot + 1]; ++c) {
+        const std::uint32_t* triangle =
+            &slot_of_corner_[corners_[c].object][3 * std::size_t{corners_[c].triangle}];
+        for (int k = 0; k < 3; ++k) {
+          if (buried[triangle[k]] != 0) continue;
+          sum += gathered[triangle[k]];
+          ++count;
+        }
+      }
+      values[slot] = sum / static_cast<float>(count);
+    }
+  });
 }
 
 void IrradianceCache::fill_buried(std::vector<glm::vec3>& values,

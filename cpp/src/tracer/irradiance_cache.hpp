@@ -19,6 +19,9 @@ struct TriangleCorner;
 /// lands on a mirror follows it a few bounces, but emission seen that way is left out: a gathered caustic
 /// would be noise. Vertices buried in another body see only the dark inside of it; they take the value of
 /// their neighbours, or triangles that stick out of the body would fade to black.
+///
+/// On an object of many vertices each one takes fewer rays and the mean with its neighbours, whose rays it
+/// shares: what is gathered is as noisy as elsewhere, and blurred over distances that are small there.
 class IrradianceCache {
  public:
   IrradianceCache();
@@ -52,6 +55,9 @@ class IrradianceCache {
   /// Adds up what the passes bring.
   void gather(const World& world, const TracerOptions& options);
   void fill_buried(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
+  /// Takes means with the neighbours, buried ones left out, where slots have a share of the rays.
+  void share_rays(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
+  int rays_of(std::size_t slot, int rays, int least) const;
 
   /// Slot of each triangle corner, three per triangle, per object; empty for objects without diffuse
   /// reflection.
@@ -59,6 +65,7 @@ class IrradianceCache {
   /// Corners of each slot: corners_[first_corner_[slot]] … corners_[first_corner_[slot + 1]].
   std::vector<std::uint32_t> first_corner_;
   std::vector<TriangleCorner> corners_;
+  std::vector<float> ray_share_;  ///< per object, of the rays that a slot has elsewhere, in (0,1]
   Sides total_;
   std::uint64_t seed_ = 0;
 };

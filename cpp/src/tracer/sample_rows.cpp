@@ -24,7 +24,7 @@ void for_each_array(const Task& task) {
   };
   call(&S::pixel, &S::part, &S::triangle, &S::barycentric, &S::position, &S::normal, &S::reflection,
        &S::dposition_dx, &S::dposition_dy, &S::dreflection_dx, &S::dreflection_dy, &S::fresnel, &S::albedo,
-       &S::emission, &S::diffuse);
+       &S::emission, &S::back, &S::diffuse);
 }
 
 /// Moves the rows' arrays one behind the other; `array` picks one out of a row's samples.
@@ -109,6 +109,7 @@ void record_surface(SurfaceSamples& out, const World& world, const Surface& s, f
   out.fresnel.push_back(s.fresnel);
   out.albedo.push_back(s.albedo);
   out.emission.push_back(s.emission);
+  out.back.push_back(s.front ? 0 : 1);
 }
 
 void record_light(SurfaceSamples& out, glm::vec3 body, const IncidentShells& incident) {

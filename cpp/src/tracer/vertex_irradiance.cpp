@@ -10,8 +10,15 @@
 #include "state.hpp"
 
 namespace mirrorbake {
+namespace {
 
-std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint64_t seed) const {
+// Rays after which the back of a surface is taken for the inside of a closed body.
+constexpr int kProbeRays = 64;
+
+}  // namespace
+
+std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint64_t seed,
+                                                 SurfaceSide side) const {
   using namespace tracing;  // NOLINT: this function is all about it
   state_->check_object("object", object);
   check_range("rays", rays, 1, 65536);
@@ -47,10 +54,12 @@ std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint
       poll_interrupt();
       glm::dvec3 sum(0.0);
       for (int r = 0; r < rays; ++r) {
+        if (r == kProbeRays && side == SurfaceSide::back && sum == glm::dvec3(0.0)) break;
         const auto index = static_cast<std::uint32_t>(r);
         const SampleStream stream = sample_stream(seed, v, index);
         const TriangleCorner& corner = corners[first[v] + index % count];
-        const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
+        glm::vec3 n = face_normal(world, corner.object, corner.triangle);
+        if (side == SurfaceSide::back) n = -n;
         if (n == glm::vec3(0.0F)) continue;
         const Surface start = surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), n);
         glm::vec3 found = direct_irradiance(world, start, stream.get(light_dimension), path);

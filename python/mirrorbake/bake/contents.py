@@ -9,7 +9,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.bake.fade import fit_fade
-from mirrorbake.bake.sample import DIFFUSE_RAYS, SampleBaker
+from mirrorbake.bake.sample import SampleBaker, diffuse_layer, lit_sides
 from mirrorbake.bake.static_set import infer_static_set
 from mirrorbake.pem.header import Header
 from mirrorbake.pem.pyramid import capture
@@ -48,10 +48,11 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
     irradiance = None
     if plan.has_diffuse:
         # Where the scene changes, every sample writes its own.
-        count = len(built.space) if built.space.changes_scene else 1
-        irradiance = np.zeros((count, len(built.positions), 3), np.float32)
-        if count == 1:
-            irradiance[0] = tracer.vertex_irradiance(built.reflector, DIFFUSE_RAYS, config.trace.seed)
+        sides = lit_sides(stage)
+        if built.space.changes_scene:
+            irradiance = np.zeros((len(built.space), len(built.positions), 3 * sides), np.float32)
+        else:
+            irradiance = diffuse_layer(stage, sides)[None]
     shared = bool(plan.value("maps.shared_distant"))
     header = Header(
         source=source,

@@ -10,7 +10,7 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.bake.static_set import stripes_of
 from mirrorbake.bake.targets import ViewTracer
-from mirrorbake.pem.run_time import fade_weight, model_of, shell_maps
+from mirrorbake.pem.run_time import diffuse_of, fade_weight, model_of, shell_maps
 from mirrorbake.scene.pose import AT_REST
 from mirrorbake.tone import srgb_encoded
 
@@ -102,9 +102,7 @@ def _held_out(
             lookups, images = stripe.view.lookups, stripe.view.images
             diffuse = None
             if contents.irradiance is not None:
-                diffuse = _core.diffuse_from_irradiance(
-                    lookups, stage.built.triangles, contents.irradiance[0]
-                )
+                diffuse = diffuse_of(lookups, stage.built.triangles, contents.irradiance[0])
             drawn = [np.asarray(_core.render_reflector(lookups, parts, diffuse, model)) for parts in sets]
             seen = (images.coverage > 0.99) & (drawn[0][..., 3] > 0.99)
             pixels.append((drawn[0][seen][:, :3], drawn[1][seen][:, :3], images.object[seen]))

@@ -31,8 +31,28 @@ if TYPE_CHECKING:
     Maps = dict[tuple[str, str], FloatArray]
     Reports = dict[tuple[str, str], SolverReport]
 
-DIFFUSE_RAYS = 1024
-"""Gather rays per vertex of the diffuse layer."""
+_MOST_RAYS, _LEAST_RAYS, _RAYS_OF_A_MESH = 1024, 64, 1 << 23
+_PROBE_RAYS = 16
+
+
+def diffuse_layer(stage: Stage, sides: int) -> FloatArray:
+    """Return the irradiance at the reflector's vertices, (V, 3 * sides): on the front, and on the back.
+
+    Up to 1024 rays are gathered at a vertex; of a fine mesh fewer, since more vertices share a pixel.
+    """
+    seed, built = stage.config.trace.seed, stage.built
+    rays = min(_MOST_RAYS, max(_LEAST_RAYS, _RAYS_OF_A_MESH // max(1, len(built.positions))))
+    front = np.asarray(stage.tracer.vertex_irradiance(built.reflector, rays, seed))
+    if sides == 1:
+        return front
+    back = stage.tracer.vertex_irradiance(built.reflector, rays, seed, "back")
+    return np.concatenate([front, back], axis=1)
+
+
+def lit_sides(stage: Stage) -> int:
+    """Return 2 if light reaches the backs of the reflector's triangles, as in a bowl without thickness."""
+    back = stage.tracer.vertex_irradiance(stage.built.reflector, _PROBE_RAYS, stage.config.trace.seed, "back")
+    return 2 if np.any(back) else 1
 
 
 @dataclass(frozen=True)
@@ -43,7 +63,7 @@ class BakedSample:
     """Pyramids (texels, C) by part and shell."""
     images: ViewImages
     irradiance: FloatArray | None
-    """(V, 3), where it differs from sample to sample."""
+    """(V, 3), or (V, 6) with the backs, where it differs from sample to sample."""
     timings: Timings
     reports: Reports
     rejected: int = 0
@@ -58,6 +78,7 @@ class SampleBaker:
         self._header = contents.header
         self._captured = captured_pyramids(stage, contents.header, contents.capture)
         self._static_maps = contents.static_maps
+        self._sides = 1 if contents.irradiance is None else contents.irradiance.shape[2] // 3
         self._local_triangles = contents.local_triangles
         self._topology = contents.header.topology
         self._infer = stage.config.infer
@@ -72,9 +93,7 @@ class SampleBaker:
         stage = self._stage.at(point)
         irradiance = None
         if self._header.space.changes_scene and self._header.plan.has_diffuse:
-            irradiance = stage.tracer.vertex_irradiance(
-                stage.built.reflector, DIFFUSE_RAYS, stage.config.trace.seed
-            )
+            irradiance = diffuse_layer(stage, self._sides)
         captured = captured_pyramids(stage, self._header) if stage.place else self._captured
         pose = arranged(self._stage.config, self._header.space.scene_coordinates(point)).pose
         if self._infer.fit == "display":

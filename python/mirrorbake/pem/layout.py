@@ -63,7 +63,10 @@ class Contents:
     capture: FloatArray
     """The captured map's finest level, shape (F, S, S, 3), F faces."""
     irradiance: FloatArray | None
-    """Diffuse layer, shape (1, V, 3), or (N, V, 3) that each sample fills; None: there is none."""
+    """Diffuse layer, shape (1, V, C), or (N, V, C) that each sample fills; None: there is none.
+
+    C is 3, the fronts alone, or 6, fronts and backs.
+    """
     local_triangles: NDArray[np.uint8] | None
     """Shape (T,), 0 for triangles of the reflector that shells for `off hull` leave out; None: for none."""
     static_maps: FloatArray | None = None
@@ -100,29 +103,32 @@ MOST_OF_A_MESH = 1 << 28
 """Vertices or triangles that a reflector may have."""
 
 
-def shared_layout(name: str, counted: int, header: Header) -> Layout:
+def shared_layout(name: str, shape: tuple[int, ...], header: Header) -> Layout:
     """Return the layout of an array that all samples share.
 
     Parameters
     ----------
     name
         Of the array.
-    counted
-        Vertices or triangles of the reflector, whichever it has a row for.
+    shape
+        That is stored: it says how many vertices or triangles of the reflector there are rows for, and
+        whether irradiance has backs.
     header
         Of the PEM.
     """
-    size, texels = header.map_size, header.topology.texels
+    size, texels, counted = header.map_size, header.topology.texels, counted_in(name, shape)
     if name == "static/capture":
-        shape: tuple[int, ...] = (header.faces, size, size, 3)
-        return Layout(shape, shape, None, "float32", ("face", "row", "column", "channel"))
+        faces = (header.faces, size, size, 3)
+        return Layout(faces, faces, None, "float32", ("face", "row", "column", "channel"))
     if name == "static/maps":
-        shape = (len(header.maps), texels, 4)
-        return Layout(shape, (1, texels, 4), None, header.precision, ("map", "texel", "channel"))
+        maps = (len(header.maps), texels, 4)
+        return Layout(maps, (1, texels, 4), None, header.precision, ("map", "texel", "channel"))
     if name == "local_triangles":
         return Layout((counted,), (counted,), None, "uint8", ("triangle",))
     samples = len(header.space) if header.space.changes_scene else 1
-    return Layout((samples, counted, 3), (1, counted, 3), None, "float32", ("sample", "vertex", "channel"))
+    channels = 6 if shape[-1:] == (6,) else 3
+    whole, chunk = (samples, counted, channels), (1, counted, channels)
+    return Layout(whole, chunk, None, "float32", ("sample", "vertex", "channel"))
 
 
 def counted_in(name: str, shape: tuple[int, ...]) -> int:

@@ -99,6 +99,15 @@ TRACED_SAMPLES = "reference"
 """Name of the run time that reads maps once for every traced sample."""
 
 
+def diffuse_of(
+    samples: _core.SurfaceSamples, triangles: NDArray[np.uint32], irradiance: FloatArray
+) -> FloatArray:
+    """Return the radiance (n, 3) of samples' bodies from irradiance (V, 3), or (V, 6) with the backs."""
+    front = np.ascontiguousarray(irradiance[:, :3])
+    back = np.ascontiguousarray(irradiance[:, 3:]) if irradiance.shape[1] > 3 else None
+    return np.asarray(_core.diffuse_from_irradiance(samples, triangles, front, back))
+
+
 @dataclass
 class RunTime:
     """A PEM opened for drawing.
@@ -200,7 +209,7 @@ class RunTime:
         irradiance = self._irradiance_at(point)
         if irradiance is None:
             return None
-        return np.asarray(_core.diffuse_from_irradiance(samples, self.triangles, irradiance))
+        return diffuse_of(samples, self.triangles, irradiance)
 
     def _pem_parts(self, point: PointLike, away: float) -> list[list[_core.ShellMap]]:
         blend = self._header.space.neighbours(point)

@@ -8,7 +8,7 @@ array                 shape           holds
 `maps`                (N, M, T, C)    every map of a sample: finest level, then residuals of the others
 `reference`           (N, H, W, 7)    ray traced: object R G B, its coverage, background R G B
 `record`              (N, K)          seconds, clamped values and the solver's report. Written last
-`diffuse/irradiance`  (1 or N, V, 3)  W m⁻² at the object's vertices, if it has a diffuse layer
+`diffuse/irradiance`  (1|N, V, 3|6)   W m⁻² at the object's vertices: on fronts, and on backs if lit
 `static/capture`      (F, S, S, 3)    traced from the object's centre, the object removed
 `static/maps`         (M, T, 4)       the static set: maps for views far from all samples, if there is one
 `local_triangles`     (T,)            0: on the convex hull, where no shell for `off hull` is read
@@ -172,9 +172,7 @@ class PemStore:
             raise StoreError(f"{where}: damaged: {name}: {failure}") from None
         if not isinstance(array, zarr.Array):
             raise StoreError(f"{where}: damaged: {name} is not an array")
-        layout = sample_layouts(self.header).get(name) or shared_layout(
-            name, counted_in(name, array.shape), self.header
-        )
+        layout = sample_layouts(self.header).get(name) or shared_layout(name, array.shape, self.header)
         found = (array.shape, array.chunks, array.shards, str(array.dtype))
         expected = (layout.shape, layout.chunk, layout.shard, layout.dtype)
         if found != expected:
@@ -298,7 +296,7 @@ class PemStore:
         delete_key(self._group.store, f"record/c/{index}/0")
 
     def write_irradiance(self, index: int, irradiance: FloatArray) -> None:
-        """Write the diffuse layer (V, 3) of one sample, where it is not the same for all."""
+        """Write the diffuse layer (V, 3 or 6) of one sample, where it is not the same for all."""
         self._array("diffuse/irradiance")[index] = irradiance
 
     def read_map(self, part: str, layer: str, index: int) -> FloatArray:
@@ -344,7 +342,7 @@ class PemStore:
         return np.stack([read_back(pyramid, self.header) for pyramid in self._read("static/maps")])
 
     def read_irradiance(self, index: int = 0) -> FloatArray | None:
-        """Irradiance at the object's vertices in one sample, shape (V, 3); None without a diffuse layer."""
+        """Irradiance at the object's vertices in one sample, shape (V, 3), or (V, 6) with backs; or None."""
         if not self._has("diffuse/irradiance"):
             return None
         return self._read("diffuse/irradiance", index if self.has_irradiance_per_sample else 0).astype(

@@ -46,9 +46,10 @@ std::vector<glm::vec4> shell_light(const SurfaceSamples& samples, const ShellMap
                                    const RunTimeModel& model = reference_run_time());
 
 /// D of every sample from irradiance baked per vertex: albedo/π times the irradiance interpolated over the
-/// triangle.
+/// triangle. Samples that see the back of theirs take `back_irradiance`, unless it is empty.
 std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
                                                std::span<const glm::uvec3> triangles,
-                                               std::span<const glm::vec3> vertex_irradiance);
+                                               std::span<const glm::vec3> vertex_irradiance,
+                                               std::span<const glm::vec3> back_irradiance = {});
 
 }  // namespace mirrorbake

@@ -55,6 +55,7 @@ struct SurfaceSamples {
   std::vector<glm::vec3> fresnel;   ///< F of the first bounce, per channel
   std::vector<glm::vec3> albedo;    ///< diffuse albedo with texture, times (1 − F) under a coat
   std::vector<glm::vec3> emission;  ///< radiance of the surface's own; empty: none
+  std::vector<std::uint8_t> back;   ///< 1 where the eye sees the back of the triangle; empty: nowhere
 
   // The light that was traced; empty when only visibility was asked for.
   std::vector<glm::vec3> diffuse;  ///< D: radiance that the body reflects and emits, one entry per sample

@@ -29,7 +29,8 @@ enum class IndirectLight { none, cached, path };
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
   /// Gather rays per vertex of the `cached` indirect light, 1…65536; a quarter of them after the first
-  /// bounce.
+  /// bounce. Of an object of more than 16384 vertices each takes a share, down to a fifth, and shares its
+  /// neighbours'.
   int cache_rays = 64;
   int cache_bounces = 3;   ///< diffuse bounces that `cached` follows, 1…16
   std::uint64_t seed = 0;  ///< of the cache
@@ -44,6 +45,9 @@ struct PixelWindow {
 
   bool operator==(const PixelWindow&) const = default;
 };
+
+/// The front of a triangle is where its corners are counter-clockwise.
+enum class SurfaceSide { front, back };
 
 struct TraceOptions {
   int samples_per_pixel = 16;  ///< 1…65536, stratified
@@ -178,10 +182,12 @@ class Tracer {
                  std::span<const int> hidden, std::span<float> distance,
                  std::span<std::int32_t> object) const;
 
-  /// Irradiance (W m⁻²) on the front at every vertex of an object, all light included, the object itself
+  /// Irradiance (W m⁻²) on one side at every vertex of an object, all light included, the object itself
   /// taking part: the view-independent diffuse layer. An average over the quarter of each adjacent triangle
-  /// next to the vertex, by `rays` (1…65536) samples; 0 at vertices without triangles.
-  std::vector<glm::vec3> vertex_irradiance(int object, int rays, std::uint64_t seed) const;
+  /// next to the vertex, by `rays` (1…65536) samples; 0 at vertices without triangles, and on a back that
+  /// the first 64 find without light.
+  std::vector<glm::vec3> vertex_irradiance(int object, int rays, std::uint64_t seed,
+                                           SurfaceSide side = SurfaceSide::front) const;
 
  private:
   struct State;

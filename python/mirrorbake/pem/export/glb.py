@@ -218,7 +218,7 @@ def _add_mesh(
     )
     irradiance = store.read_irradiance()
     if irradiance is not None:
-        attributes["_IRRADIANCE"] = file.add_vertices(irradiance)
+        attributes["_IRRADIANCE"] = file.add_vertices(np.ascontiguousarray(irradiance[:, :3]))
     local = store.read_local_triangles()
     stacked = np.ones(len(built.triangles), np.bool_) if local is None else local != 0
     primitives = []

@@ -129,7 +129,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
     def irradiance(sample: int) -> FloatArray:
         values = store.read_irradiance(sample)
         assert values is not None
-        return values
+        return values[:, :3]
 
     first = store.read_irradiance()
     changes = first is not None and store.has_irradiance_per_sample
@@ -168,7 +168,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
             uvs=np.asarray(mesh.uvs) if materials.textures else np.zeros((0, 2), np.float32),
             colors=np.asarray(mesh.colors),
             materials=np.array([numbers.index(number) for number in of_part], np.uint16)[built.parts],
-            irradiance=first,
+            irradiance=None if first is None else first[:, :3],
         ),
         materials=materials,
         irradiance=irradiance if changes else None,

@@ -19,6 +19,7 @@
 #include "mirrorbake/envmap/footprint.hpp"
 #include "mirrorbake/envmap/half_envmap.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
+#include "mirrorbake/envmap/repair.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/envmap/sampling.hpp"
 #include "signature.hpp"
@@ -250,44 +251,50 @@ tuple[NDArray[numpy.float32], NDArray[numpy.float32]])">(),
       "The map in, or from, the orientation of openexr, oiio, mitsuba, threejs or ktx2.");
   m.def(
       "load_envmap",
-      [](const PathText& path, std::optional<std::string> projection, FaceLayout faces) {
+      [](const PathText& path, std::optional<std::string> projection, FaceLayout faces,
+         const std::string& layer, const std::string& part, bool repair) {
         std::optional<Projection> given;
         if (projection) given = parse_projection(*projection);
         EnvMap map;
+        std::size_t bad = 0;
         {
           nb::gil_scoped_release released;
-          map = load_envmap(path.text, given, faces);
+          map = load_envmap(path.text, given, faces, {}, {part, layer});
+          bad = repair ? repair_not_finite(path.text, map) : count_not_finite(map);
         }
-        return nb::make_tuple(map.layout, block(std::move(map.values)), map.channels);
+        return nb::make_tuple(map.layout, block(std::move(map.values)), map.channels, bad);
       },
       nb::arg("path"), nb::arg("projection") = nb::none(), nb::arg("faces") = FaceLayout::automatic,
+      nb::arg("layer") = "", nb::arg("part") = "", nb::arg("repair") = false,
       signature<R"(def load_envmap(path: str | os.PathLike[str], projection: str | None = None,
-faces: typing.Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic') ->
-tuple[EnvMapLayout, NDArray[numpy.float32], list[str]])">(),
-      "Layout, values and names of the channels of a map in an image, KTX2 or DDS file.");
+faces: typing.Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic',
+layer: str = '', part: str = '', repair: bool = False) -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str], int])">(),
+      R"(Layout, values and names of the channels of a map in an image, KTX2 or DDS file, and how many values
+are NaN or infinite there, which `repair` fills from their surroundings.)");
 }
 
 void bind_files(nb::module_& m) {
   m.def(
       "load_panorama",
-      [](const PathText& path, const std::string& layer, const std::string& part) {
+      [](const PathText& path, const std::string& layer, const std::string& part, bool repair) {
         Panorama panorama;
         {
           nb::gil_scoped_release released;
-          panorama = load_panorama(path.text, {part, layer});
+          panorama = load_panorama(path.text, {.choice = {part, layer}, .repairs = repair});
         }
         const auto height = static_cast<std::size_t>(panorama.image.height);
         const auto width = static_cast<std::size_t>(panorama.image.width);
         return nb::make_tuple(to_numpy(std::move(panorama.image.pixels), {height, width, 3}),
-                              panorama.negative);
+                              panorama.negative, panorama.repaired);
       },
-      nb::arg("path"), nb::arg("layer") = "", nb::arg("part") = "",
-      signature<R"(def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') ->
-tuple[NDArray[numpy.float32], int])">(),
-      R"(A map as light: a latlong of R, G and B, (height, width, 3), finite and nowhere below 0; and how
-many values were negative in the file. Cubes are recognised by their shape and resampled; alpha, depth
-and other channels are left out. `layer` and `part` choose in an EXR file. Raises FileError for a picture
-that is no panorama, and for values that are not finite.)");
+      nb::arg("path"), nb::arg("layer") = "", nb::arg("part") = "", nb::arg("repair") = false,
+      signature<R"(def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '',
+repair: bool = False) -> tuple[NDArray[numpy.float32], int, int])">(),
+      R"(A map as light: a latlong of R, G and B, (height, width, 3), finite and nowhere below 0; how many
+values were negative in the file, and how many NaN or infinite. Cubes are recognised by their shape and
+resampled; alpha, depth and other channels are left out. `layer` and `part` choose in an EXR file. Raises
+FileError for a picture that is no panorama, and for values that are not finite unless `repair` fills
+them from their surroundings.)");
   m.def(
       "save_envmap",
       [](const PathText& path, const EnvMapLayout& layout, FloatArray values,

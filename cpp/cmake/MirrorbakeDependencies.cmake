@@ -54,6 +54,7 @@ endif()
 
 include(MirrorbakeCodecs)
 _mirrorbake_report(libwebp webp_FOUND "" 1.2 libwebp-dev "WebP textures")
+_mirrorbake_report(libzstd zstd_FOUND "" 1.5 libzstd-dev "KTX2 files")
 _mirrorbake_report(Draco draco_FOUND "${draco_VERSION}" 1.5 libdraco-dev "compressed glTF meshes")
 _mirrorbake_report(meshoptimizer meshoptimizer_FOUND "${meshoptimizer_VERSION}" 0.18 libmeshoptimizer-dev "compressed glTF meshes")
 

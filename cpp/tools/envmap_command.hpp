@@ -12,6 +12,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/conventions.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
+#include "mirrorbake/envmap/repair.hpp"
 
 /// What the commands of mb-envmap have in common.
 namespace mirrorbake::tool {
@@ -22,6 +23,8 @@ struct Input {
   std::string projection;
   std::string layout = "automatic";
   std::string convention = "mirrorbake";
+  ImageChoice choice;
+  bool repairs = false;
 
   void add_options(CLI::App& app, const std::string& name = "input") {
     app.add_option(name, path,
@@ -38,11 +41,28 @@ struct Input {
     app.add_option("--from-convention", convention,
                    "orientation of " + whose + ": mirrorbake, openexr, oiio, mitsuba, threejs, ktx2")
         ->capture_default_str();
+    app.add_option("--layer", choice.layer, "layer of an EXR file (default: all channels)");
+    app.add_option("--part", choice.part,
+                   "part of an EXR file, by name or number (default: the first with colours)");
+    app.add_flag("--repair", repairs, "fill NaN and infinite values from their surroundings");
   }
+  /// With a warning of values that are not finite.
   EnvMap load() const {
+    EnvMap map = read();
+    if (const std::size_t bad = count_not_finite(map); bad > 0) {
+      std::cerr << "mb-envmap: warning: " << path << ": " << bad
+                << " values are NaN or infinite; --repair fills them\n";
+    }
+    return map;
+  }
+  EnvMap read() const {
     std::optional<Projection> given;
     if (!projection.empty()) given = parse_projection(projection);
-    EnvMap map = load_envmap(path, given, parse_face_layout(layout));
+    EnvMap map = load_envmap(path, given, parse_face_layout(layout), {}, choice);
+    const std::size_t filled = repairs ? repair_not_finite(path, map) : 0;
+    if (filled > 0) {
+      std::cerr << "mb-envmap: " << path << ": " << filled << " values were NaN or infinite and are filled\n";
+    }
     return convention == "mirrorbake" ? map
                                       : convert_convention(map, convention, ConventionWay::from_foreign);
   }

@@ -15,7 +15,7 @@ namespace mirrorbake::tool {
 namespace {
 
 void print_info(const Input& input, bool json) {
-  const EnvMap map = input.load();
+  const EnvMap map = input.read();
   std::vector<float> low(static_cast<std::size_t>(map.layout.channels),
                          std::numeric_limits<float>::infinity());
   std::vector<float> high(low.size(), -std::numeric_limits<float>::infinity());

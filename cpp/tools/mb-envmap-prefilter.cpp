@@ -168,9 +168,10 @@ class Prefilter final : public Command {
   void only(const char* model, CLI::Option* option) { only_.emplace_back(model, option); }
 
   EnvMap load() const {
-    EnvMap map = input_.load();
+    EnvMap map = input_.read();
     if (const std::size_t bad = count_not_finite(map); bad > 0) {
-      throw FileError(input_.path, "has " + std::to_string(bad) + " NaN or infinite values, expected none");
+      throw FileError(input_.path, "has " + std::to_string(bad) +
+                                       " NaN or infinite values, expected none; --repair fills them");
     }
     return map;
   }

@@ -87,11 +87,15 @@ EnvironmentLight white_sky() {
   return sky;
 }
 
-Image load_sky(const std::string& path, const ImageChoice& choice) {
-  Panorama panorama = load_panorama(path, choice);
+Image load_sky(const std::string& path, const PanoramaOptions& options) {
+  Panorama panorama = load_panorama(path, options);
   if (panorama.negative > 0) {
     std::cerr << "mb-trace: warning: " << path << ": " << panorama.negative
               << " negative values were taken as 0\n";
+  }
+  if (panorama.repaired > 0) {
+    std::cerr << "mb-trace: warning: " << path << ": " << panorama.repaired
+              << " values were NaN or infinite and are filled\n";
   }
   return std::move(panorama.image);
 }
@@ -151,9 +155,10 @@ void Request::add_options(CLI::App& app) {
       "--sky", sky,
       "panorama that lights the scene, latitude-longitude or a cube's strip, cross or KTX2, instead of "
       "the scene's own");
-  app.add_option("--layer", sky_choice.layer, "layer of an EXR sky (default: its only colours)");
-  app.add_option("--part", sky_choice.part,
+  app.add_option("--layer", sky_options.choice.layer, "layer of an EXR sky (default: its only colours)");
+  app.add_option("--part", sky_options.choice.part,
                  "part of an EXR sky, by name or number (default: the first with colours)");
+  app.add_flag("--repair", sky_options.repairs, "fill NaN and infinite values of the sky");
   app.add_option("--camera", camera_name, "a camera of the scene, by name (default: its first)");
   app.add_option("--eye", eye, "x y z of the eye, metres")->type_size(3)->expected(1);
   app.add_option("--target", target, "x y z of the point in the image's middle, metres")
@@ -168,7 +173,7 @@ Source Request::load() const {
   Source source = load_source(path);
   if (!sky.empty()) {
     source.scene.environment.emplace();
-    source.scene.environment->panorama = load_sky(sky, sky_choice);
+    source.scene.environment->panorama = load_sky(sky, sky_options);
   } else if (is_dark(source.scene)) {
     std::cerr << "mb-trace: warning: " << path << ": no lights; a white sky of radiance 1 is added\n";
     source.scene.environment = white_sky();

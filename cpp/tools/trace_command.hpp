@@ -33,7 +33,7 @@ struct Request {
   std::string output;
   std::string indirect = "path";
   std::string sky;
-  ImageChoice sky_choice;
+  PanoramaOptions sky_options;
   std::string camera_name;
   std::vector<float> eye, target;
   std::optional<float> fov;

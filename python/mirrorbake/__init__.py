@@ -13,8 +13,8 @@ except ImportError as failure:
         raise
     raise ImportError(
         f"mirrorbake's compiled part cannot be loaded: {failure}. Install Embree, oneTBB, OpenEXR, libwebp, "
-        "tinygltf, Draco and meshoptimizer as it was built with; Debian, Ubuntu: apt-get install "
-        "libembree-dev libtbb-dev libopenexr-dev libwebp-dev libtinygltf-dev libdraco-dev "
+        "libzstd, tinygltf, Draco and meshoptimizer as it was built with; Debian, Ubuntu: apt-get install "
+        "libembree-dev libtbb-dev libopenexr-dev libwebp-dev libzstd-dev libtinygltf-dev libdraco-dev "
         "libmeshoptimizer-dev"
     ) from failure
 

@@ -1534,17 +1534,19 @@ def convert_convention(layout: EnvMapLayout, values: Annotated[NDArray[numpy.flo
     The map in, or from, the orientation of openexr, oiio, mitsuba, threejs or ktx2.
     """
 
-def load_envmap(path: str | os.PathLike[str], projection: str | None = None, faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic') -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str]]:
+def load_envmap(path: str | os.PathLike[str], projection: str | None = None, faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic', layer: str = '', part: str = '', repair: bool = False) -> tuple[EnvMapLayout, NDArray[numpy.float32], list[str], int]:
     """
-    Layout, values and names of the channels of a map in an image, KTX2 or DDS file.
+    Layout, values and names of the channels of a map in an image, KTX2 or DDS file, and how many values
+    are NaN or infinite there, which `repair` fills from their surroundings.
     """
 
-def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '') -> tuple[NDArray[numpy.float32], int]:
+def load_panorama(path: str | os.PathLike[str], layer: str = '', part: str = '', repair: bool = False) -> tuple[NDArray[numpy.float32], int, int]:
     """
-    A map as light: a latlong of R, G and B, (height, width, 3), finite and nowhere below 0; and how
-    many values were negative in the file. Cubes are recognised by their shape and resampled; alpha, depth
-    and other channels are left out. `layer` and `part` choose in an EXR file. Raises FileError for a picture
-    that is no panorama, and for values that are not finite.
+    A map as light: a latlong of R, G and B, (height, width, 3), finite and nowhere below 0; how many
+    values were negative in the file, and how many NaN or infinite. Cubes are recognised by their shape and
+    resampled; alpha, depth and other channels are left out. `layer` and `part` choose in an EXR file. Raises
+    FileError for a picture that is no panorama, and for values that are not finite unless `repair` fills
+    them from their surroundings.
     """
 
 def save_envmap(path: str | os.PathLike[str], layout: EnvMapLayout, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], channels: Sequence[str], faces: Literal['automatic', 'strip', 'column', 'grid', 'cross', 'vertical_cross', 'files'] = 'automatic', format: Literal['automatic', 'half', 'float32', 'uint8', 'uint16'] = 'automatic') -> SaveReport:

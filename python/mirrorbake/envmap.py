@@ -14,6 +14,7 @@ Examples
 from __future__ import annotations
 
 import tempfile
+import warnings
 from dataclasses import dataclass
 from os import fspath
 from pathlib import Path
@@ -126,7 +127,14 @@ class EnvMap:
 
     @classmethod
     def load(
-        cls, path: str | PathLike[str], projection: str | None = None, *, faces: FaceLayout = "automatic"
+        cls,
+        path: str | PathLike[str],
+        projection: str | None = None,
+        *,
+        faces: FaceLayout = "automatic",
+        layer: str = "",
+        part: str = "",
+        repair: bool = False,
     ) -> EnvMap:
         """Read an EXR, HDR, TIFF, PNG, JPEG, KTX2 or DDS.
 
@@ -138,13 +146,22 @@ class EnvMap:
             By default found from the shape of the image.
         faces
             How faces share the image: strip, column, grid, cross, vertical_cross, or automatic.
+        layer, part
+            Of an EXR file: the channels of one layer, and the part by name or number; by default all
+            channels of the first part that has colours.
+        repair
+            Fill values that are NaN or infinite from their surroundings, instead of warning of them.
 
         Raises
         ------
         FileError
             If there is no such file, or it is damaged, or its shape fits no projection.
         """
-        layout, values, names = _core.load_envmap(fspath(path), projection, faces)
+        layout, values, names, bad = _core.load_envmap(fspath(path), projection, faces, layer, part, repair)
+        if bad and not repair:
+            warnings.warn(
+                f"{fspath(path)}: {bad} values are NaN or infinite; repair=True fills them", stacklevel=2
+            )
         return cls(layout, values, names)
 
     def save(

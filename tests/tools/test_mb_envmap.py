@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mirrorbake import load_image
+from mirrorbake import load_image, save_image
 from mirrorbake.envmap import EnvMap
 from mirrorbake.prefilter.backgrounds import background, fisheye, perspective, rotation
 from mirrorbake.projection import texel_directions
@@ -429,3 +429,34 @@ def test_mips_go_through_dds(tmp_path: Path) -> None:
     again = EnvMap.load(tmp_path / "out.dds")
     assert again.levels == 5
     np.testing.assert_array_equal(again.values, source.mips().values)
+
+
+def test_values_that_are_not_finite_are_counted_and_repaired(tmp_path: Path) -> None:
+    values = np.full((8, 16, 3), 2.0, np.float32)
+    values[3, 4, 1], values[0, 15], values[5, 5, 2] = np.nan, np.inf, -np.inf
+    path = tmp_path / "holes.exr"
+    EnvMap.from_array(values, "latlong").save(path, format="float32")
+    assert json.loads(mb_envmap("info", path, "--json"))["not_finite"] == 5
+    cube = tmp_path / "cube.exr"
+    convert = ("convert", path, "--to", "cube", "--size", 4, "-o", cube)
+    mb_envmap(*convert, "--repair")
+    np.testing.assert_allclose(np.asarray(EnvMap.load(cube)), 2.0, rtol=1e-3)
+    assert "expected none; --repair fills them" in mb_envmap(
+        "prefilter", path, "--model", "irradiance", "-o", cube, status=3
+    )
+    with pytest.warns(UserWarning, match="5 values are NaN or infinite; repair=True fills them"):
+        EnvMap.load(path)
+    np.testing.assert_array_equal(EnvMap.load(path, repair=True).level(), 2.0)
+
+
+def test_a_layer_is_chosen_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "layers.exr"
+    names = [f"{layer}.{colour}" for layer in ("sky", "sun") for colour in "RGB"]
+    save_image(path, np.tile(np.arange(1, 7, dtype=np.float32), (2, 4, 1)), names)
+    info = json.loads(mb_envmap("info", path, "--layer", "sun", "--json"))
+    assert (info["channels"], info["max"]) == (["R", "G", "B"], [4, 5, 6])
+    assert EnvMap.load(path, layer="sky").level().max(axis=(0, 1)).tolist() == [1, 2, 3]
+    assert "has no layer 'moon', expected one of sky, sun" in mb_envmap(
+        "info", path, "--layer", "moon", status=3
+    )
+    assert "has no part '2'" in mb_envmap("info", path, "--part", "2", status=3)

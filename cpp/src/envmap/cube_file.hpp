@@ -1,19 +1,23 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cctype>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
+#include "mirrorbake/envmap/envmap_io.hpp"
+#include "mirrorbake/image/bytes.hpp"
 #include "mirrorbake/image/image_io.hpp"
 
 /// What readers and writers of cubes with their levels have in common: KTX2 and DDS.
@@ -53,36 +57,46 @@ class ByteWriter {
 /// A file of which nothing is read before it is known to hold it.
 class FileBytes {
  public:
-  FileBytes(const std::string& path, const ImageLimits& limits)
-      : path_(path), in_(path, std::ios::binary | std::ios::ate) {
-    std::error_code error;
-    if (!std::filesystem::exists(path, error)) throw FileError(path, "does not exist");
-    if (!std::filesystem::is_regular_file(path, error) || !in_) throw FileError(path, "cannot be read");
-    size_ = static_cast<std::uint64_t>(in_.tellg());
-    if (size_ > limits.max_bytes) throw FileError(path, "is too large");
+  FileBytes(const std::string& name, const image_files::Bytes& bytes, const ImageLimits& limits)
+      : name_(name), bytes_(bytes) {
+    if (bytes.size() > limits.max_bytes) throw FileError(name, "is too large");
   }
 
   void require(std::uint64_t offset, std::uint64_t bytes) const {
-    if (offset > size_ || bytes > size_ - offset) throw FileError(path_, "is truncated");
+    if (offset > bytes_.size() || bytes > bytes_.size() - offset) throw FileError(name_, "is truncated");
   }
-  void read(std::uint64_t offset, void* data, std::uint64_t bytes) {
-    require(offset, bytes);
-    in_.seekg(static_cast<std::streamoff>(offset));
-    in_.read(static_cast<char*>(data), static_cast<std::streamsize>(bytes));
-    if (!in_) throw FileError(path_, "cannot be read");
+  void read(std::uint64_t offset, std::span<unsigned char> to) const {
+    require(offset, to.size());
+    if (bytes_.read(offset, to) != to.size()) throw FileError(name_, "cannot be read");
   }
   template <typename T>
-  T get(std::uint64_t offset) {
+  T get(std::uint64_t offset) const {
+    std::array<unsigned char, sizeof(T)> raw{};
+    read(offset, raw);
     T value;
-    read(offset, &value, sizeof value);
+    std::memcpy(&value, raw.data(), sizeof value);
     return value;
   }
 
  private:
-  std::string path_;
-  std::ifstream in_;
-  std::uint64_t size_ = 0;
+  const std::string& name_;
+  const image_files::Bytes& bytes_;
 };
+
+/// What such a file holds: a cube, or a picture that has one face and may be any map. A picture's projection
+/// is not known; it stands in the layout as latlong.
+struct MapFile {
+  EnvMap map;
+  bool is_picture = false;
+};
+
+MapFile read_ktx2(const std::string& name, const image_files::Bytes& bytes, const ImageLimits& limits);
+EnvMap read_dds(const std::string& name, const image_files::Bytes& bytes, const ImageLimits& limits);
+
+/// The map in a file's picture, as unpack_faces finds it in an image; maps of one face keep their levels.
+/// Throws FileError.
+EnvMap unpacked(const std::string& name, MapFile file, const std::optional<Projection>& projection,
+                FaceLayout layout);
 
 inline EnvMap without_alpha(const EnvMap& map) {
   EnvMapLayout layout = map.layout;

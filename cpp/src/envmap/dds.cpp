@@ -14,6 +14,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
 #include "mirrorbake/image/half.hpp"
+#include "texel_format.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -33,12 +34,13 @@ constexpr std::uint64_t kDx10Bytes = 20;
 constexpr std::uint32_t kFlags = 0x1 | 0x2 | 0x4 | 0x1000;
 constexpr std::uint32_t kFlagPitch = 0x8, kFlagLinearSize = 0x80000;
 constexpr std::uint32_t kFlagLevels = 0x20000;
-constexpr std::uint32_t kFourCc = 0x4;                               // DDPF_FOURCC
-constexpr std::uint32_t kCaps = 0x1000 | 0x8;                        // TEXTURE | COMPLEX
-constexpr std::uint32_t kCapsLevels = 0x400000;                      // MIPMAP
-constexpr std::uint32_t kCube = 0x200;                               // DDSCAPS2_CUBEMAP
-constexpr std::uint32_t kAllFaces = 0xfc00;                          // all six DDSCAPS2_CUBEMAP_…
-constexpr std::uint32_t kTexture2d = 3, kMiscCube = 4, kOpaque = 3;  // of the DX10 header
+constexpr std::uint32_t kFourCc = 0x4;                    // DDPF_FOURCC
+constexpr std::uint32_t kCaps = 0x1000 | 0x8;             // TEXTURE | COMPLEX
+constexpr std::uint32_t kCapsLevels = 0x400000;           // MIPMAP
+constexpr std::uint32_t kCube = 0x200;                    // DDSCAPS2_CUBEMAP
+constexpr std::uint32_t kAllFaces = 0xfc00;               // all six DDSCAPS2_CUBEMAP_…
+constexpr std::uint32_t kTexture2d = 3, kMiscCube = 4;    // of the DX10 header
+constexpr std::uint32_t kPremultiplied = 2, kOpaque = 3;  // its alpha modes
 
 constexpr std::uint32_t kBc6hUnsigned = 95;  // DXGI_FORMAT_BC6H_UF16
 constexpr std::uint32_t kBc6hSigned = 96;
@@ -47,19 +49,25 @@ constexpr std::uint32_t kBc6hSigned = 96;
 struct Format {
   std::uint32_t dxgi;
   std::uint32_t code;
-  int channels;
-  std::size_t bytes;  // of a channel; 0: blocks of BC6H
+  TexelFormat texels;
 };
-constexpr std::array<Format, 9> kFormats = {{
-    {54, 111, 1, 2},
-    {34, 112, 2, 2},
-    {10, 113, 4, 2},
-    {41, 114, 1, 4},
-    {16, 115, 2, 4},
-    {6, 0, 3, 4},
-    {2, 116, 4, 4},
-    {kBc6hUnsigned, 0, 3, 0},
-    {kBc6hSigned, 0, 3, 0},
+constexpr std::array<Format, 16> kFormats = {{
+    {54, 111, {TexelCode::half, 1}},
+    {34, 112, {TexelCode::half, 2}},
+    {10, 113, {TexelCode::half, 4}},
+    {41, 114, {TexelCode::float32, 1}},
+    {16, 115, {TexelCode::float32, 2}},
+    {6, 0, {TexelCode::float32, 3}},
+    {2, 116, {TexelCode::float32, 4}},
+    {28, 0, {TexelCode::unorm8, 4}},
+    {29, 0, {TexelCode::unorm8, 4, true}},
+    {87, 0, {TexelCode::unorm8, 4, false, true}},
+    {91, 0, {TexelCode::unorm8, 4, true, true}},
+    {11, 36, {TexelCode::unorm16, 4}},
+    {26, 0, {TexelCode::r11g11b10, 3}},
+    {67, 0, {TexelCode::rgb9e5, 3}},
+    {kBc6hUnsigned, 0, {TexelCode::bc6h_unsigned, 3}},
+    {kBc6hSigned, 0, {TexelCode::bc6h_signed, 3}},
 }};
 
 // Calls visit(level, face) in the order of the file: all levels of a face, one face after the other.
@@ -85,28 +93,6 @@ std::uint64_t bc6h_bytes(const EnvMapLayout& layout) {
     bytes += across * across * kBc6hBytes;
   });
   return bytes;
-}
-
-// Texels of a face; those of the last blocks that lie beyond it are left out.
-void read_bc6h(FileBytes& in, std::uint64_t& place, std::size_t side, bool is_signed, float* values) {
-  const std::size_t across = (side + 3) / 4;
-  std::vector<std::uint8_t> line(across * kBc6hBytes);
-  std::array<std::uint16_t, 48> halves{};
-  for (std::size_t top = 0; top < side; top += 4) {
-    in.read(place, line.data(), line.size());
-    place += line.size();
-    for (std::size_t block = 0; block < across; ++block) {
-      decode_bc6h(std::span(line).subspan(block * kBc6hBytes).first<kBc6hBytes>(), is_signed, halves);
-      for (std::size_t texel = 0; texel < 16; ++texel) {
-        const std::size_t row = top + texel / 4;
-        const std::size_t column = 4 * block + texel % 4;
-        if (row >= side || column >= side) continue;
-        for (std::size_t c = 0; c < 3; ++c) {
-          values[(row * side + column) * 3 + c] = float_from_half(halves[3 * texel + c]);
-        }
-      }
-    }
-  }
 }
 
 // `bytes` of a line of texels or, of compressed ones, of the whole finest level.
@@ -150,11 +136,10 @@ SaveReport save_dds(const std::string& path, const EnvMapView& map, PixelFormat 
   const bool whole = pixels == PixelFormat::float32;
   const int stored = layout.channels == 3 ? 4 : layout.channels;
   const Format& format = *std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& f) {
-    return f.channels == stored && f.bytes == (whole ? 4U : 2U);
+    return f.texels.channels == stored && f.texels.code == (whole ? TexelCode::float32 : TexelCode::half);
   });
   ByteWriter out;
-  put_header(out, layout, format.dxgi,
-             static_cast<std::size_t>(layout.width) * format.bytes * static_cast<std::size_t>(stored), false);
+  put_header(out, layout, format.dxgi, stored_bytes(format.texels, layout.width, 1), false);
 
   SaveReport report;
   const std::size_t channels = static_cast<std::size_t>(layout.channels);
@@ -192,7 +177,11 @@ void save_dds_bc6h(const std::string& path, const EnvMapLayout& layout, std::spa
 }
 
 EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
-  FileBytes in(path, limits);
+  return read_dds(path, *image_files::open_bytes(path), limits);
+}
+
+EnvMap read_dds(const std::string& path, const image_files::Bytes& bytes, const ImageLimits& limits) {
+  const FileBytes in(path, bytes, limits);
   if (in.get<std::uint32_t>(0) != kMagic || in.get<std::uint32_t>(4) != 124 ||
       in.get<std::uint32_t>(76) != 32) {
     throw FileError(path, "is not a DDS file");
@@ -208,7 +197,9 @@ EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
     const std::string found = dx10       ? "the DXGI format " + std::to_string(dxgi)
                               : has_code ? "the format code " + std::to_string(code)
                                          : "pixels of integers";
-    throw FileError(path, "has " + found + ", expected float16, float32 or BC6H");
+    throw FileError(
+        path,
+        "has " + found + ", expected float16, float32, BC6H, RGB9E5, R11G11B10, or RGBA of 8 or 16 bits");
   }
   const bool cube = dx10 ? in.get<std::uint32_t>(kHeaderBytes + 4) == kTexture2d &&
                                (in.get<std::uint32_t>(kHeaderBytes + 8) & kMiscCube) != 0 &&
@@ -227,33 +218,34 @@ EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
   if (levels > static_cast<std::uint32_t>(full_level_count(side, side))) {
     throw FileError(path, "has " + std::to_string(levels) + " levels, more than its size allows");
   }
-  const EnvMapLayout layout{{ProjectionKind::cube}, side, side, static_cast<int>(levels), format->channels};
+  const EnvMapLayout layout{
+      {ProjectionKind::cube}, side, side, static_cast<int>(levels), format->texels.channels};
   if (layout.size() > limits.max_bytes / sizeof(float)) throw FileError(path, "is too large");
   // Whether the file holds what its header promises is known before memory is taken for it.
   std::uint64_t place = kHeaderBytes + (dx10 ? kDx10Bytes : 0);
-  const bool is_bc6h = format->bytes == 0;
-  in.require(place, is_bc6h ? bc6h_bytes(layout) : layout.size() * std::uint64_t{format->bytes});
-  const bool opaque =
-      dx10 && format->channels == 4 && (in.get<std::uint32_t>(kHeaderBytes + 16) & 7U) == kOpaque;
-  EnvMap map = make_envmap(layout, default_channels(format->channels));
-  std::vector<std::uint16_t> halves;
+  std::uint64_t expected = 0;
+  const auto face_bytes = [&](int level) {
+    return stored_bytes(format->texels, layout.level_width(level), layout.level_height(level));
+  };
+  for_each_image(layout, [&](int level, int) { expected += face_bytes(level); });
+  in.require(place, expected);
+  const auto alpha = dx10 ? in.get<std::uint32_t>(kHeaderBytes + 16) & 7U : 0U;
+  EnvMap map = make_envmap(layout, default_channels(layout.channels));
+  std::vector<unsigned char> stored;
   for_each_image(layout, [&](int level, int face) {
     const std::size_t count = values_of_face(layout, level);
-    float* values = map.values.data() + layout.level_offset(level) + static_cast<std::size_t>(face) * count;
-    if (is_bc6h) {
-      read_bc6h(in, place, static_cast<std::size_t>(layout.level_width(level)), dxgi == kBc6hSigned, values);
-      return;
-    }
-    if (format->bytes == sizeof(float)) {
-      in.read(place, values, count * sizeof(float));
-    } else {
-      halves.resize(count);
-      in.read(place, halves.data(), count * sizeof(std::uint16_t));
-      std::transform(halves.begin(), halves.end(), values, float_from_half);
-    }
-    place += count * format->bytes;
+    const std::size_t first = layout.level_offset(level) + static_cast<std::size_t>(face) * count;
+    stored.resize(face_bytes(level));
+    in.read(place, stored);
+    place += stored.size();
+    decode_texels(format->texels, layout.level_width(level), layout.level_height(level), stored,
+                  std::span(map.values).subspan(first, count));
   });
-  return opaque ? without_alpha(map) : map;
+  if (layout.channels == 4 && alpha == kOpaque) return without_alpha(map);
+  if (layout.channels == 4 && format->texels.is_integer() && alpha != kPremultiplied) {
+    multiply_by_alpha(map.values);
+  }
+  return map;
 }
 
 }  // namespace mirrorbake

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
+#include "cube_file.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/dds.hpp"
 #include "mirrorbake/envmap/ktx2.hpp"
+#include "mirrorbake/envmap/repair.hpp"
 #include "mirrorbake/envmap/resample.hpp"
 #include "mirrorbake/projection/traits.hpp"
 
@@ -116,13 +119,14 @@ std::optional<FaceLayout> recognised_cube(const Image& image) {
   return std::nullopt;
 }
 
-EnvMap load_faces(const std::string& path, const Projection& projection, const ImageLimits& limits) {
+EnvMap load_faces(const std::string& path, const Projection& projection, const ImageLimits& limits,
+                  const ImageChoice& choice) {
   if (face_count(projection) == 1)
     throw FileError(path, "names several images, but the projection has one face");
   EnvMap map;
   for (int face = 0; face < face_count(projection); ++face) {
     const std::string name = face_path(path, projection, face);
-    Image image = load_image(name, limits);
+    Image image = load_image(name, limits, choice);
     const EnvMapLayout layout{projection, image.width, image.height, 1, image.channel_count()};
     if (face == 0) {
       if (image.width > 65536 / 6 && layout.size() > limits.max_bytes / sizeof(float))
@@ -139,6 +143,36 @@ EnvMap load_faces(const std::string& path, const Projection& projection, const I
               map.values.begin() + static_cast<std::ptrdiff_t>(layout.index(0, face, 0, 0)));
   }
   return map;
+}
+
+EnvMap unpacked(const std::string& name, const Image& image, const std::optional<Projection>& projection,
+                FaceLayout layout) {
+  try {
+    return unpack_faces(image, projection, layout);
+  } catch (const InvalidArgument& e) {
+    throw FileError(name, e.what());
+  }
+}
+
+// What a file of a map with its levels holds: by its first bytes, or by its name if these are damaged.
+std::optional<MapFile> file_of_levels(const std::string& name, const image_files::Bytes& bytes,
+                                      const ImageLimits& limits, const ImageChoice& choice) {
+  constexpr std::string_view kKtx = "\xabKTX ";
+  constexpr std::string_view kDds = "DDS ";
+  std::array<unsigned char, kKtx.size()> head{};
+  const std::size_t size = bytes.read(0, head);
+  const auto starts_with = [&](std::string_view magic) {
+    return size >= magic.size() &&
+           std::equal(magic.begin(), magic.end(), head.begin(),
+                      [](char a, unsigned char b) { return static_cast<unsigned char>(a) == b; });
+  };
+  const bool ktx = starts_with(kKtx) || is_ktx2(name);
+  if (!ktx && !starts_with(kDds) && !is_dds(name)) return std::nullopt;
+  if (!choice.part.empty() || !choice.layer.empty()) {
+    throw FileError(name, "has no parts and layers to choose from, expected an EXR file");
+  }
+  if (ktx) return read_ktx2(name, bytes, limits);
+  return MapFile{read_dds(name, bytes, limits)};
 }
 
 }  // namespace
@@ -222,27 +256,56 @@ EnvMap unpack_faces(const Image& image, const std::optional<Projection>& project
 
 bool stores_levels(const std::string& path) { return is_ktx2(path) || is_dds(path); }
 
-EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection, FaceLayout layout,
-                   const ImageLimits& limits) {
-  if (is_ktx2(path)) return load_ktx2(path, limits);
-  if (is_dds(path)) return load_dds(path, limits);
-  if (names_faces(path)) {
-    return load_faces(path, projection.value_or(Projection{ProjectionKind::cube}), limits);
+EnvMap unpacked(const std::string& name, MapFile file, const std::optional<Projection>& projection,
+                FaceLayout layout) {
+  if (!file.is_picture) return std::move(file.map);
+  const EnvMapLayout& found = file.map.layout;
+  Image finest(found.width, found.height, file.map.channels);
+  std::copy_n(file.map.values.begin(), finest.pixels.size(), finest.pixels.begin());
+  EnvMap map = unpacked(name, finest, projection, layout);
+  if (face_count(map.layout.projection) == 1) {
+    map.layout.levels = found.levels;
+    map.values = std::move(file.map.values);
   }
-  const Image image = load_image(path, limits);
-  try {
-    return unpack_faces(image, projection, layout);
-  } catch (const InvalidArgument& e) {
-    throw FileError(path, e.what());
-  }
+  return map;
 }
 
-Panorama load_panorama(const std::string& path, const ImageChoice& choice, const ImageLimits& limits) {
+EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection, FaceLayout layout,
+                   const ImageLimits& limits, const ImageChoice& choice) {
+  if (names_faces(path)) {
+    return load_faces(path, projection.value_or(Projection{ProjectionKind::cube}), limits, choice);
+  }
+  if (std::optional<MapFile> file = file_of_levels(path, *image_files::open_bytes(path), limits, choice)) {
+    return unpacked(path, *std::move(file), projection, layout);
+  }
+  return unpacked(path, load_image(path, limits, choice), projection, layout);
+}
+
+EnvMap decode_envmap(const std::string& name, std::span<const unsigned char> bytes,
+                     const std::optional<Projection>& projection, FaceLayout layout,
+                     const ImageLimits& limits, const ImageChoice& choice) {
+  if (std::optional<MapFile> file = file_of_levels(name, *image_files::bytes_in(bytes), limits, choice)) {
+    return unpacked(name, *std::move(file), projection, layout);
+  }
+  return unpacked(name, decode_image(name, bytes, {.limits = limits, .choice = choice}), projection, layout);
+}
+
+Panorama load_panorama(const std::string& path, const PanoramaOptions& options) {
   EnvMap map;
-  if (stores_levels(path)) {
-    map = is_dds(path) ? load_dds(path, limits) : load_ktx2(path, limits);
+  std::optional<MapFile> file =
+      file_of_levels(path, *image_files::open_bytes(path), options.limits, options.choice);
+  if (file && !file->is_picture) {
+    map = std::move(file->map);
   } else {
-    const Image image = colours_of(path, load_image(path, limits, choice));
+    Image image;
+    if (file) {
+      const EnvMapLayout& layout = file->map.layout;
+      image = Image(layout.width, layout.height, file->map.channels);
+      std::copy_n(file->map.values.begin(), image.pixels.size(), image.pixels.begin());
+    } else {
+      image = load_image(path, options.limits, options.choice);
+    }
+    image = colours_of(path, std::move(image));
     const std::optional<FaceLayout> cube = recognised_cube(image);
     if (image.width != 2 * image.height && !cube) {
       throw FileError(
@@ -254,21 +317,23 @@ Panorama load_panorama(const std::string& path, const ImageChoice& choice, const
     map = unpack_faces(image, projection, cube.value_or(FaceLayout::automatic));
   }
   if (map.layout.channels == 2) throw FileError(path, "has two channels, expected grey or R, G, B");
+  const std::size_t not_finite = count_not_finite(map);
+  if (not_finite > 0 && !options.repairs) {
+    throw FileError(path, std::to_string(not_finite) +
+                              " values are NaN or infinite, expected radiance; the option repair fills them");
+  }
+  Panorama panorama;
+  panorama.repaired = repair_not_finite(path, map);
   if (map.layout.projection.kind == ProjectionKind::cube) {
     EnvMapView finest(map);
     map = resample(finest, Projection{ProjectionKind::latlong}, 4 * map.layout.width, 2 * map.layout.width);
   }
   const auto channels = static_cast<std::size_t>(map.layout.channels);
-  Panorama panorama{Image(map.layout.width, map.layout.height, {"R", "G", "B"})};
-  std::size_t not_finite = 0;
+  panorama.image = Image(map.layout.width, map.layout.height, {"R", "G", "B"});
   for (std::size_t i = 0; i < panorama.image.pixels.size(); ++i) {
     const float value = map.values[i / 3 * channels + (channels == 1 ? 0 : i % 3)];
-    if (!std::isfinite(value)) ++not_finite;
     if (value < 0.0F) ++panorama.negative;
     panorama.image.pixels[i] = std::max(value, 0.0F);
-  }
-  if (not_finite > 0) {
-    throw FileError(path, std::to_string(not_finite) + " values are not finite, expected radiance");
   }
   return panorama;
 }

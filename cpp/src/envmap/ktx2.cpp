@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cube_file.hpp"
+#include "ktx2_file.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/version.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
@@ -16,11 +17,6 @@
 
 namespace mirrorbake {
 namespace {
-
-constexpr std::array<std::uint8_t, 12> kIdentifier = {0xab, 'K',  'T',  'X',  ' ',  '2',
-                                                      '0',  0xbb, '\r', '\n', 0x1a, '\n'};
-constexpr std::size_t kHeaderBytes = 80;
-constexpr std::size_t kLevelBytes = 24;
 
 // VkFormat numbers of the Vulkan specification, VK_FORMAT_R16_SFLOAT and so on.
 struct Format {
@@ -68,29 +64,7 @@ void put_key(ByteWriter& out, std::string_view key, std::string_view value) {
   out.pad(4);
 }
 
-constexpr std::string_view kSwizzleKey = "KTXswizzle";
 constexpr std::string_view kOpaque = "rgb1";
-
-// Whether the file's key/value data say that alpha is to be read as 1.
-bool is_opaque(FileBytes& in, const std::string& path) {
-  std::uint64_t place = in.get<std::uint32_t>(56);
-  const std::uint64_t end = place + in.get<std::uint32_t>(60);
-  in.require(place, end - place);
-  const std::string wanted = std::string(kSwizzleKey) + '\0' + std::string(kOpaque);
-  while (place < end) {
-    const std::uint64_t size = in.get<std::uint32_t>(place);
-    place += sizeof(std::uint32_t);
-    if (size < 2 || size > end - place) throw FileError(path, "has damaged key/value data");
-    // The value's terminating zero is there or not, as its writer likes.
-    if (size == wanted.size() || size == wanted.size() + 1) {
-      std::string entry(wanted.size(), '\0');
-      in.read(place, entry.data(), entry.size());
-      if (entry == wanted) return true;
-    }
-    place += (size + 3) / 4 * 4;
-  }
-  return false;
-}
 
 }  // namespace
 
@@ -118,7 +92,7 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map, PixelFormat
     return f.channels == stored && f.bytes == (whole ? 4u : 2u);
   });
   ByteWriter out;
-  for (const std::uint8_t v : kIdentifier) out.put(v);
+  for (const std::uint8_t v : kKtx2Identifier) out.put(v);
   out.put(format.vk_format);
   out.put(static_cast<std::uint32_t>(format.bytes));
   out.put(static_cast<std::uint32_t>(layout.width));
@@ -127,7 +101,7 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map, PixelFormat
   out.put(static_cast<std::uint32_t>(layout.levels));
   out.put<std::uint32_t>(0);  // not supercompressed
   const std::size_t index = out.bytes.size();
-  out.bytes.resize(kHeaderBytes + kLevelBytes * static_cast<std::size_t>(layout.levels));
+  out.bytes.resize(kKtx2HeaderBytes + kKtx2LevelBytes * static_cast<std::size_t>(layout.levels));
   const std::size_t data_format = out.bytes.size();
   put_data_format(out, stored, format.bytes);
   const std::size_t keys = out.bytes.size();
@@ -157,7 +131,7 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map, PixelFormat
         out.put(half_from_float(clamp_to_half(v, report.clamped_to_half)));
       }
     }
-    const std::size_t entry = kHeaderBytes + kLevelBytes * static_cast<std::size_t>(level);
+    const std::size_t entry = kKtx2HeaderBytes + kKtx2LevelBytes * static_cast<std::size_t>(level);
     const std::uint64_t bytes = out.bytes.size() - begin;
     out.overwrite(entry, static_cast<std::uint64_t>(begin));
     out.overwrite(entry + 8, bytes);
@@ -168,63 +142,8 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map, PixelFormat
 }
 
 EnvMap load_ktx2(const std::string& path, const ImageLimits& limits) {
-  FileBytes in(path, limits);
-  std::array<std::uint8_t, 12> identifier{};
-  in.read(0, identifier.data(), identifier.size());
-  if (identifier != kIdentifier) throw FileError(path, "is not a KTX2 file");
-  const auto vk_format = in.get<std::uint32_t>(12);
-  const auto format = std::find_if(kFormats.begin(), kFormats.end(),
-                                   [&](const Format& f) { return f.vk_format == vk_format; });
-  if (format == kFormats.end()) {
-    throw FileError(path, "has the pixel format VkFormat " + std::to_string(vk_format) +
-                              ", expected float16 or float32 of one to four channels");
-  }
-  const auto width = in.get<std::uint32_t>(20);
-  const auto height = in.get<std::uint32_t>(24);
-  if (in.get<std::uint32_t>(28) > 1 || in.get<std::uint32_t>(32) > 1 || in.get<std::uint32_t>(36) != 6) {
-    throw FileError(path, "is not a single cube map");
-  }
-  const auto levels = std::max(in.get<std::uint32_t>(40), 1u);
-  if (in.get<std::uint32_t>(44) != 0) throw FileError(path, "is supercompressed, which is not supported");
-  const auto most = static_cast<std::uint32_t>(std::min(limits.max_side, 65536));
-  if (width < 1 || width > most || width != height) {
-    throw FileError(path, "has faces of " + std::to_string(width) + " x " + std::to_string(height) +
-                              " texels, expected square ones of 1 to " + std::to_string(most));
-  }
-  const int side = static_cast<int>(width);
-  if (levels > static_cast<std::uint32_t>(full_level_count(side, side))) {
-    throw FileError(path, "has " + std::to_string(levels) + " levels, more than its size allows");
-  }
-  const EnvMapLayout layout{{ProjectionKind::cube}, side, side, static_cast<int>(levels), format->channels};
-  if (layout.size() > limits.max_bytes / sizeof(float)) throw FileError(path, "is too large");
-
-  // Whether the file holds what its header promises is known before memory is taken for it.
-  for (std::uint32_t level = 0; level < levels; ++level) {
-    const std::uint64_t entry = kHeaderBytes + kLevelBytes * level;
-    const auto offset = in.get<std::uint64_t>(entry);
-    const auto bytes = in.get<std::uint64_t>(entry + 8);
-    const std::uint64_t expected = layout.level_texels(static_cast<int>(level)) *
-                                   static_cast<std::uint64_t>(format->channels) * format->bytes;
-    if (bytes != expected) throw FileError(path, "has a damaged index: level " + std::to_string(level));
-    in.require(offset, bytes);
-  }
-  const bool opaque = format->channels == 4 && is_opaque(in, path);
-  EnvMap map = make_envmap(layout, default_channels(format->channels));
-  std::vector<std::uint16_t> halves;
-  for (std::uint32_t level = 0; level < levels; ++level) {
-    const auto offset = in.get<std::uint64_t>(kHeaderBytes + kLevelBytes * level);
-    const std::size_t first = layout.level_offset(static_cast<int>(level));
-    const std::size_t count = layout.level_offset(static_cast<int>(level) + 1) - first;
-    if (format->bytes == sizeof(float)) {
-      in.read(offset, map.values.data() + first, count * sizeof(float));
-      continue;
-    }
-    halves.resize(count);
-    in.read(offset, halves.data(), count * sizeof(std::uint16_t));
-    std::transform(halves.begin(), halves.end(), map.values.begin() + static_cast<std::ptrdiff_t>(first),
-                   float_from_half);
-  }
-  return opaque ? without_alpha(map) : map;
+  return unpacked(path, read_ktx2(path, *image_files::open_bytes(path), limits), std::nullopt,
+                  FaceLayout::automatic);
 }
 
 }  // namespace mirrorbake

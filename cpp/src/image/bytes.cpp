@@ -1,4 +1,4 @@
-#include "bytes.hpp"
+#include "mirrorbake/image/bytes.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bytes.hpp"
+#include "mirrorbake/image/bytes.hpp"
 
 /// What stands between a file and OpenImageIO. The reader interprets metadata that this library does not use,
 /// and its XMP parser overflows the stack on nested elements; so a decoder sees a file whose metadata are

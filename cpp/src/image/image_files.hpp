@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "bytes.hpp"
 #include "guard.hpp"
 #include "image_kinds.hpp"
+#include "mirrorbake/image/bytes.hpp"
 #include "mirrorbake/image/image_io.hpp"
 
 /// What the readers of image files share: OpenEXR's, which is part of this library, and OpenImageIO's in a

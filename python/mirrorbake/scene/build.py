@@ -143,10 +143,11 @@ def _loaded_scene(config: SceneConfig, path: str) -> tuple[_core.LoadedScene, Or
 
 def _add_panorama(scene: _core.Scene, surroundings: Surroundings, origin: Origin) -> list[str]:
     assert surroundings.panorama is not None
-    panorama, negative = _core.load_panorama(
-        surroundings.panorama, surroundings.layer or "", surroundings.part or ""
+    panorama, negative, repaired = _core.load_panorama(
+        surroundings.panorama, surroundings.layer or "", surroundings.part or "", surroundings.repair
     )
-    notes = [f"{surroundings.panorama}: {negative} negative values were taken as 0"] if negative else []
+    counts = {"negative values were taken as 0": negative, "values were not finite and are filled": repaired}
+    notes = [f"{surroundings.panorama}: {count} {words}" for words, count in counts.items() if count]
     scene.set_environment(panorama, surroundings.scale, surroundings.rotation)
     if surroundings.ground is not None:
         material = _core.Material(name="ground", albedo=surroundings.ground.albedo)

@@ -163,6 +163,8 @@ class Surroundings(Section):
     """Of a panorama in an EXR file that has colours in several layers."""
     part: str | None = None
     """Of a panorama in an EXR file of several parts: name or number. Otherwise the first with colours."""
+    repair: bool = False
+    """Fill NaN and infinite values of the panorama from their surroundings, instead of refusing it."""
     scene: str | None = None
     """An .obj, .gltf or .glb file with objects, materials and lights; or give `room` or `panorama`."""
     rotation: float = 0.0

@@ -12,6 +12,7 @@
 #include <iterator>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
@@ -19,6 +20,7 @@
 #include "mirrorbake/envmap/envmap_io.hpp"
 #include "mirrorbake/envmap/mipmap.hpp"
 #include "mirrorbake/image/atomic_file.hpp"
+#include "mirrorbake/image/color.hpp"
 #include "mirrorbake/image/half.hpp"
 
 namespace mirrorbake {
@@ -129,6 +131,28 @@ TEST_F(Dds, OlderHeadersAreReadAndOtherPixelsAreNamed) {
     ADD_FAILURE() << "BC7 was read";
   } catch (const FileError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("DXGI format 98"));
+  }
+}
+
+TEST_F(Dds, ColoursOf8BitsAreDecoded) {
+  const EnvMap map = noise(2, 4);
+  save_dds(path("a.dds"), map, PixelFormat::half);
+  std::vector<std::byte> bytes = bytes_of("a.dds");
+  bytes.resize(148 + (bytes.size() - 148) / 2);
+  for (std::size_t i = 148; i < bytes.size(); ++i)
+    bytes[i] = static_cast<std::byte>(i % 4 == 3 ? 255 : i % 251);
+  for (const auto& [dxgi, is_srgb, blue_first] :
+       {std::tuple(28U, false, false), {29U, true, false}, {87U, false, true}, {91U, true, true}}) {
+    set_word(bytes, 128, dxgi);
+    write_file(path("b.dds"), bytes);
+    const EnvMap read = load_dds(path("b.dds"));
+    ASSERT_EQ(read.layout.channels, 4);
+    // The first texel; levels of a face lie together in the file.
+    for (std::size_t c = 0; c < 4; ++c) {
+      const std::size_t from = blue_first && c < 3 ? 2 - c : c;
+      const float value = static_cast<float>(std::to_integer<int>(bytes[148 + from])) / 255.0F;
+      EXPECT_FLOAT_EQ(read.values[c], is_srgb && c < 3 ? srgb_decode(value) : value) << dxgi << ' ' << c;
+    }
   }
 }
 

@@ -427,6 +427,9 @@ TEST_F(EnvMapFiles, APanoramaIsFiniteAndNowhereBelow0) {
   image.pixels[4] = std::numeric_limits<float>::infinity();
   save_image(path("glows.exr"), image, PixelFormat::float32);
   EXPECT_THROW(load_panorama(path("glows.exr")), FileError);
+  const Panorama repaired = load_panorama(path("glows.exr"), {.choice = {}, .repairs = true});
+  EXPECT_EQ(repaired.image.pixels, (std::vector<float>{1, 0, 3, 0, 0, 6}));
+  EXPECT_EQ(repaired.repaired, 1U);
 }
 
 TEST_F(EnvMapFiles, DepthAndAlphaAreNoLightAndGreyIsAllColours) {

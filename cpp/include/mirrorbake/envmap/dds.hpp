@@ -30,9 +30,10 @@ void check_dds_path(const std::string& path, const Projection& projection,
 /// number of bytes and what is no such cube, FileError if the file cannot be written.
 void save_dds_bc6h(const std::string& path, const EnvMapLayout& layout, std::span<const std::byte> blocks);
 
-/// Reads a cube map of float16 or float32 with one to four channels, or of BC6H, with any number of levels,
-/// with a DX10 header or the older codes of such pixels (as cmft writes). An alpha that is opaque is left
-/// out. Throws FileError for anything else, damaged files and those beyond `limits`.
+/// Reads a cube map with any number of levels: float16 or float32 of one to four channels, BC6H, RGB9E5,
+/// R11G11B10, or RGBA of 8 or 16 bits, with a DX10 header or the older codes of floats (as cmft writes). An
+/// alpha that is opaque is left out; colours of integers are multiplied by another unless they are. Throws
+/// FileError for anything else, damaged files and those beyond `limits`.
 EnvMap load_dds(const std::string& path, const ImageLimits& limits = {});
 
 }  // namespace mirrorbake

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -35,25 +36,39 @@ Image pack_faces(const EnvMapView& map, int level, FaceLayout layout);
 /// 4:3, 3:4) are cubes. Throws InvalidArgument if the shape of the image does not fit.
 EnvMap unpack_faces(const Image& image, const std::optional<Projection>& projection, FaceLayout layout);
 
-/// Reads any image format, or KTX2 by its extension. A path with `{}` names one image per face. Throws
-/// FileError, also for a shape that fits no projection.
+/// Reads any image format, KTX2 or DDS: which one follows from the first bytes. A path with `{}` names one
+/// image per face. A KTX2 file of one face is a map as an image is, and keeps its levels if it has one face.
+/// `choice` is of EXR's parts and layers. Throws FileError, also for a shape that fits no projection.
 EnvMap load_envmap(const std::string& path, const std::optional<Projection>& projection = std::nullopt,
-                   FaceLayout layout = FaceLayout::automatic, const ImageLimits& limits = {});
+                   FaceLayout layout = FaceLayout::automatic, const ImageLimits& limits = {},
+                   const ImageChoice& choice = {});
+
+/// The same of a file that is in memory; `name` stands for its path in errors.
+EnvMap decode_envmap(const std::string& name, std::span<const unsigned char> bytes,
+                     const std::optional<Projection>& projection = std::nullopt,
+                     FaceLayout layout = FaceLayout::automatic, const ImageLimits& limits = {},
+                     const ImageChoice& choice = {});
 
 /// A panorama as it lights a scene: finite, nowhere below 0.
 struct Panorama {
   Image image;
   std::size_t negative = 0;  ///< values that were below 0 in the file and are 0 here
+  std::size_t repaired = 0;  ///< values that were NaN or infinite and have been filled
+};
+
+struct PanoramaOptions {
+  ImageChoice choice;
+  bool repairs = false;  ///< whether NaN and infinite values are filled, as repair_not_finite does
+  ImageLimits limits = {};
 };
 
 /// Reads a map as light: a latlong of R, G and B, grey repeated, without alpha, depth and other channels. A
-/// picture of 2:1 is one; cubes are recognised, and resampled, as KTX2 files, by 6:1 or 1:6, and as crosses
-/// whose corners are all alike. Throws FileError for any other picture, which is no panorama unless somebody
-/// says so, for no or several layers of colours among which `choice` has not chosen, for values that are not
-/// finite, and for what load_image refuses. Panoramas that were scaled down with a sharpening filter
-/// undershoot beside their lights: that is taken as 0.
-Panorama load_panorama(const std::string& path, const ImageChoice& choice = {},
-                       const ImageLimits& limits = {});
+/// picture of 2:1 is one; cubes are recognised, and resampled, as KTX2 and DDS files, by 6:1 or 1:6, and as
+/// crosses whose corners are all alike. Throws FileError for any other picture, which is no panorama unless
+/// somebody says so, for no or several layers of colours among which `choice` has not chosen, for values that
+/// are not finite and are not to be repaired, and for what load_image refuses. Panoramas that were scaled
+/// down with a sharpening filter undershoot beside their lights: that is taken as 0.
+Panorama load_panorama(const std::string& path, const PanoramaOptions& options = {});
 
 /// What save_envmap would refuse whatever the map's values are, before they are computed. Throws FileError
 /// for a path that cannot be written or stored in `format`; InvalidArgument for a layout or `{}` that does

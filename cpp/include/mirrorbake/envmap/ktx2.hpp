@@ -22,9 +22,11 @@ SaveReport save_ktx2(const std::string& path, const EnvMapView& map,
 void check_ktx2_path(const std::string& path, const Projection& projection,
                      PixelFormat format = PixelFormat::automatic);
 
-/// Reads a cube map of float16 or float32 with one to four channels and any number of levels, not
-/// supercompressed. An alpha that is to be read as 1 is left out. Throws FileError for anything else, damaged
-/// files and those beyond `limits`.
+/// Reads a cube map, or a picture of one face whose shape tells what map it is, with any number of levels:
+/// integers of 8 and 16 bits, linear or sRGB, float16 and float32 of one to four channels, RGB9E5, R11G11B10
+/// and BC6H; plain or supercompressed by Zstandard or ZLIB. Swizzles and the orientation of pictures are
+/// followed; an alpha that is to be read as 1 is left out, and colours of integers are multiplied by another
+/// unless they are. Throws FileError for anything else, damaged files and those beyond `limits`.
 EnvMap load_ktx2(const std::string& path, const ImageLimits& limits = {});
 
 }  // namespace mirrorbake

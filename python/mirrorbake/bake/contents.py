@@ -45,7 +45,7 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
     captured = capture(
         tracer, origin, config.maps.projection, plan.map_size, [built.reflector], stage.options
     )
-    irradiance = None
+    irradiance, sides = None, 1
     if plan.has_diffuse:
         # Where the scene changes, every sample writes its own.
         sides = lit_sides(stage)
@@ -75,7 +75,7 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
     local_triangles = None
     if plan.has_hull_split:
         local_triangles = (~hull_triangles(built.positions, built.triangles)).astype(np.uint8)
-    return Contents(header, captured, irradiance, local_triangles)
+    return Contents(header, captured, irradiance, local_triangles, lit_sides=sides)
 
 
 def with_static_set(

@@ -78,7 +78,7 @@ class SampleBaker:
         self._header = contents.header
         self._captured = captured_pyramids(stage, contents.header, contents.capture)
         self._static_maps = contents.static_maps
-        self._sides = 1 if contents.irradiance is None else contents.irradiance.shape[2] // 3
+        self._sides = contents.lit_sides
         self._local_triangles = contents.local_triangles
         self._topology = contents.header.topology
         self._infer = stage.config.infer

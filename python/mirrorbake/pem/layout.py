@@ -71,6 +71,8 @@ class Contents:
     """Shape (T,), 0 for triangles of the reflector that shells for `off hull` leave out; None: for none."""
     static_maps: FloatArray | None = None
     """The static set, (M, T, 4): pyramids of all maps, premultiplied radiance and α; None: there is none."""
+    lit_sides: int = 1
+    """1 if diffuse light falls on the fronts of triangles alone, 2 if on their backs, too."""
 
 
 def sample_layouts(header: Header) -> dict[str, Layout]:

@@ -329,6 +329,7 @@ class PemStore:
             None if irradiance is None else irradiance[None],
             self.read_local_triangles(),
             self.read_static_maps(),
+            self._array("diffuse/irradiance").shape[2] // 3 if self._has("diffuse/irradiance") else 1,
         )
 
     def read_capture(self) -> FloatArray:

@@ -278,8 +278,20 @@ def test_a_panorama_with_impossible_radiance_is_one_clear_error(tmp_path: Path, 
     _core.save_image(str(panorama), pixels, ["R", "G", "B"], "float32")
     scene = write_scene(tmp_path)
     result = run("bake", scene, "--out", tmp_path / "pem", "--set", f"surroundings.panorama={panorama}")
-    assert_one_error(result, "sky.exr", "1 values are not finite")
+    assert_one_error(result, "sky.exr", "1 values are NaN or infinite")
     assert not (tmp_path / "pem").exists()
+
+
+def test_a_panorama_is_repaired_where_the_scene_says_so(tmp_path: Path) -> None:
+    pixels = np.ones((4, 8, 3), np.float32)
+    pixels[1, 2, 0] = np.nan
+    panorama = tmp_path / "sky.exr"
+    _core.save_image(str(panorama), pixels, ["R", "G", "B"], "float32")
+    sky = ["--set", f"surroundings.panorama={panorama}", "--set", "surroundings.repair=true"]
+    result = run("bake", write_scene(tmp_path), "--out", tmp_path / "pem", *sky, "--views", "1")
+    assert result.returncode == 0, result.stderr
+    capture = PemStore.open(tmp_path / "pem").read_capture()
+    assert np.isfinite(capture).all()
 
 
 def test_negative_radiance_is_taken_as_0_with_a_warning(tmp_path: Path) -> None:

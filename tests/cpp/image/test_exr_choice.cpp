@@ -172,5 +172,48 @@ TEST_F(ExrChoice, AnAttributeLongerThanTheFileIsRefusedBeforeItIsRead) {
               HasSubstr("an attribute of its header claims"));
 }
 
+TEST_F(ExrChoice, AnEmptyHeaderIsRefusedBeforeWhatFollowsIsRead) {
+  // Single, and of several parts; behind the empty header the same claim of 1.6 GB.
+  for (const char parts : {'\x00', '\x10'}) {
+    std::string bytes("\x76\x2f\x31\x01\x02", 5);
+    bytes += parts;
+    bytes += std::string("\0\0\0Software\0string\0", 19) + std::string("\x0a\x00\x68\x61", 4) +
+             std::string(40, 'n');
+    EXPECT_THAT(
+        error_of([&] {
+          decode_image("memory", {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()});
+        }),
+        HasSubstr("its header is empty"));
+  }
+}
+
+TEST_F(ExrChoice, AnAttributeWhoseValueHasAnotherLengthThanItSaysIsRefused) {
+  const auto attribute = [](const std::string& type, const std::string& value) {
+    const auto size = static_cast<std::uint32_t>(value.size());
+    std::string bytes = std::string("\x76\x2f\x31\x01\x02\0\0\0some", 12) + '\0' + type + '\0';
+    bytes.append(reinterpret_cast<const char*>(&size), sizeof size);
+    // Where OpenEXR would read on, an attribute may claim anything.
+    return bytes + value + std::string(64, '\x7f');
+  };
+  const std::string zeros(40, '\0');
+  const std::pair<const char*, std::string> wrong[] = {
+      {"chlist", std::string("R\0", 2) + zeros.substr(0, 30)},
+      {"box2i", zeros.substr(0, 15)},
+      {"compression", zeros.substr(0, 2)},
+      {"preview", std::string("\x10\0\0\0\x10\0\0\0", 8) + zeros.substr(0, 8)},
+      {"stringvector", std::string("\xff\xff\xff\x7f", 4) + zeros},
+      {"idmanifest", std::string("\xff\xff\xff\x7f", 4) + zeros},
+  };
+  for (const auto& [type, value] : wrong) {
+    const std::string bytes = attribute(type, value);
+    EXPECT_THAT(
+        error_of([&] {
+          decode_image("memory", {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()});
+        }),
+        testing::AnyOf(HasSubstr("not the size of its type"), HasSubstr("a text of its header claims")))
+        << type;
+  }
+}
+
 }  // namespace
 }  // namespace mirrorbake

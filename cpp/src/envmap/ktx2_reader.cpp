@@ -78,7 +78,7 @@ struct Header {
 };
 
 std::string name_of(std::uint32_t vk_format) {
-  const std::string number = "VkFormat " + std::to_string(vk_format);
+  std::string number = "VkFormat " + std::to_string(vk_format);
   if (vk_format >= 131 && vk_format <= 146) return number + ", blocks of BC1 to BC7";
   if (vk_format >= 147 && vk_format <= 156) return number + ", blocks of ETC2";
   if (vk_format >= 157 && vk_format <= 184) return number + ", blocks of ASTC";

@@ -21,7 +21,8 @@ struct FixedSize {
   std::uint64_t bytes;
 };
 
-// "Predefined Attribute Types" whose values have one size. OpenEXR reads so much of them, whatever the file says.
+// "Predefined Attribute Types" whose values have one size: OpenEXR reads so much of them, whatever the file
+// says.
 constexpr FixedSize kFixedSizes[] = {
     {"box2f", 16},
     {"box2i", 16},

@@ -30,34 +30,42 @@ class Command {
 
 using AddCommand = std::unique_ptr<Command> (*)(CLI::App&);
 
+/// Parses the arguments of a program, which get --threads and --json, and calls body(json); the exit status.
+template <typename Body>
+int run_parsed(CLI::App& app, const char* json_text, int argc, char** argv, const Body& body) {
+  app.set_version_flag("--version", app.get_name() + " " MIRRORBAKE_VERSION);
+  int threads = 0;
+  bool json = false;
+  app.add_option("--threads", threads, "threads to use, 0 for all; no result depends on it")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_flag("--json", json, json_text);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const ThreadLimit limit(threads);
+  set_exr_threads(thread_count());
+  body(json);
+  return 0;
+}
+
 /// Parses the arguments and runs the command that they name; the exit status. --threads and --json are every
 /// command's.
 inline int run_program(const std::string& name, const std::string& purpose,
                        std::initializer_list<AddCommand> commands, int argc, char** argv) {
   return exit_status(name.c_str(), [&] {
     CLI::App app(purpose, name);
-    app.set_version_flag("--version", name + " " MIRRORBAKE_VERSION);
     app.require_subcommand(1);
     app.fallthrough();
-    int threads = 0;
-    bool json = false;
-    app.add_option("--threads", threads, "threads to use, 0 for all; no result depends on it")
-        ->capture_default_str()
-        ->check(CLI::Range(0, 1024));
-    app.add_flag("--json", json, "print figures as JSON, one object per line");
     std::vector<std::unique_ptr<Command>> added;
     for (const AddCommand add : commands) added.push_back(add(app));
-    try {
-      app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-      return app.exit(error) == 0 ? 0 : 2;
-    }
-    const ThreadLimit limit(threads);
-    set_exr_threads(thread_count());
-    for (const auto& command : added) {
-      if (command->wanted()) command->run(json);
-    }
-    return 0;
+    return run_parsed(app, "print figures as JSON, one object per line", argc, argv, [&](bool json) {
+      for (const auto& command : added) {
+        if (command->wanted()) command->run(json);
+      }
+    });
   });
 }
 

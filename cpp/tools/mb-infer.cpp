@@ -11,12 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "command.hpp"
 #include "mirrorbake/core/error.hpp"
-#include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/envmap/envmap_io.hpp"
 #include "mirrorbake/image/image_io.hpp"
 #include "mirrorbake/inference/layer_images.hpp"
-#include "tool.hpp"
 
 namespace mirrorbake::tool {
 namespace {
@@ -266,27 +265,14 @@ void report(const LayerInference& inference, const std::vector<std::string>& wri
 
 int run(int argc, char** argv) {
   CLI::App app("Environment maps, inferred from views of a reflector whose layers are in files.", "mb-infer");
-  app.set_version_flag("--version", "mb-infer " MIRRORBAKE_VERSION);
-  int threads = 0;
-  bool json = false;
   Request request;
   request.add_options(app);
-  app.add_option("--threads", threads, "threads to use, 0 for all; no result depends on it")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
-  app.add_flag("--json", json, "print the report as a JSON object");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  const ThreadLimit limit(threads);
-  set_exr_threads(thread_count());
-  const LayerInferenceOptions options = request.options();
-  request.check_output();
-  const LayerInference inference = infer_from_layers(request.load(), options);
-  report(inference, request.save(inference), json);
-  return 0;
+  return run_parsed(app, "print the report as a JSON object", argc, argv, [&](bool json) {
+    const LayerInferenceOptions options = request.options();
+    request.check_output();
+    const LayerInference inference = infer_from_layers(request.load(), options);
+    report(inference, request.save(inference), json);
+  });
 }
 
 }  // namespace

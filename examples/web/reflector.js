@@ -27,8 +27,11 @@ export async function loadReflector(base, glb, name) {
     for (const shell of shells) {
       if (!textures.has(shell.files[0])) textures.set(shell.files[0], await loadCube(`${base}/${shell.files[0]}`));
     }
-    const diffuse = mesh.geometry.attributes._irradiance !== undefined;
-    const material = (stack) => shellMaterial(stack, textures, surface, description.runTime, functions, diffuse);
+    const { _irradiance, _irradiance_back } = mesh.geometry.attributes;
+    const diffuse = { front: _irradiance !== undefined, back: _irradiance_back !== undefined };
+    const { side } = mesh.material;
+    const material = (stack) =>
+      shellMaterial(stack, textures, surface, description.runTime, functions, diffuse, side);
     // What lies on the convex hull cannot reflect the object itself.
     mesh.geometry.addGroup(0, stackIndices, 0);
     mesh.geometry.addGroup(stackIndices, mesh.geometry.index.count - stackIndices, 1);
@@ -63,7 +66,7 @@ async function loadCube(url) {
   return texture;
 }
 
-function shellMaterial(shells, textures, surface, runTime, functions, diffuse) {
+function shellMaterial(shells, textures, surface, runTime, functions, diffuse, side) {
   const uniforms = {};
   const maxTaps = runTime.filter === "anisotropic" ? runTime.maxTaps : 1;
   const { places, footprintScale } = runTime;
@@ -114,32 +117,36 @@ vec3 lookup${i}(vec3 p, vec3 d) {
   }[fresnel.model]();
   return new THREE.ShaderMaterial({
     uniforms,
+    side,
     vertexShader: `
-      ${diffuse ? "in vec3 _irradiance;" : "const vec3 _irradiance = vec3(0.0);"}
-      out vec3 position_, normal_, irradiance_;
+      ${diffuse.front ? "in vec3 _irradiance;" : "const vec3 _irradiance = vec3(0.0);"}
+      ${diffuse.back ? "in vec3 _irradiance_back;" : ""}
+      out vec3 position_, normal_, irradiance_, back_;
       void main() {
         position_ = (modelMatrix * vec4(position, 1.0)).xyz;
         normal_ = mat3(modelMatrix) * normal;
         irradiance_ = _irradiance;
+        back_ = ${diffuse.back ? "_irradiance_back" : "_irradiance"};
         gl_Position = projectionMatrix * viewMatrix * vec4(position_, 1.0);
       }`,
     fragmentShader: `
-      in vec3 position_, normal_, irradiance_;
+      in vec3 position_, normal_, irradiance_, back_;
       ${functions}
       ${declarations.join("\n")}
       void main() {
+        vec3 normal = gl_FrontFacing ? normal_ : -normal_;
         vec3 forward = -vec3(viewMatrix[0].z, viewMatrix[1].z, viewMatrix[2].z);
         const vec2 places[${places.length}] = vec2[](${places.map(([x, y]) => `vec2(${x.toFixed(6)}, ${y.toFixed(6)})`)});
         vec3 total = vec3(0.0);
         // The maps were inferred for just these lookups.
         for (int i = 0; i < ${places.length}; ++i) {
-          Reflection s = reflectionAt(position_, normal_, cameraPosition, forward, places[i], ${footprintScale.toFixed(6)});
+          Reflection s = reflectionAt(position_, normal, cameraPosition, forward, places[i], ${footprintScale.toFixed(6)});
           float c = dot(s.n, s.v);
           vec3 light = vec3(0.0);
           float transmittance = 1.0;
           ${reads.join("\n")}
           vec3 f = ${reflectance};
-          vec3 body = irradiance_ * vec3(${surface.albedo}) * ${1 / Math.PI};
+          vec3 body = (gl_FrontFacing ? irradiance_ : back_) * vec3(${surface.albedo}) * ${1 / Math.PI};
           total += f * light + ${surface.layers === "coated" ? "(1.0 - f) * body" : "body"};
         }
         gl_FragColor = vec4(total / ${places.length}.0, 1.0);

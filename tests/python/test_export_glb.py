@@ -20,6 +20,7 @@ from mirrorbake.errors import InputError, OptionError
 from mirrorbake.pem.export.glb import export_glb
 from mirrorbake.pem.export.glb_file import GlbFile
 from mirrorbake.pem.export.gltf_material import add_textures, gltf_material
+from mirrorbake.pem.export.mesh_file import has_border
 from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.build import BuiltScene, build_scene
 from mirrorbake.scene.load import parse_config
@@ -337,3 +338,69 @@ def test_every_part_has_its_own_material_and_the_static_set_is_the_pems(tmp_path
         radiance = np.maximum(np.exp2(code["low"] + codes * step) - code["epsilon"], 0.0)
         bound = (np.maximum(expected, 0.0) + code["epsilon"]) * (2.0 ** (0.5 * step) - 1.0)
         assert (np.abs(radiance - np.maximum(expected, 0.0)) <= 1.001 * bound + 1e-6).all()
+
+
+BOWL = """v -1 1 -1
+v 1 1 -1
+v 1 1 1
+v -1 1 1
+v 0 0 0
+f 1 5 2
+f 2 5 3
+f 3 5 4
+f 4 5 1
+"""
+
+
+def test_a_bowl_of_dual_paraboloids_keeps_them_and_the_light_on_its_backs(tmp_path: Path) -> None:
+    (tmp_path / "bowl.obj").write_text(BOWL)
+    config = parse_config(
+        {
+            "reflector": {"mesh": str(tmp_path / "bowl.obj")},
+            "material": {"albedo": 0.5, "fresnel": "schlick", "r0": [0.5, 0.5, 0.5]},
+            "views": {"count": 1, "size": [24, 24]},
+            "maps": {"size": 8, "projection": "paraboloid"},
+            "layers": {"diffuse": True},
+            "trace": {"samples": 2, "indirect": "none"},
+            "auto": {"quality": "draft"},
+        },
+        "bowl",
+    )
+    bake(config, tmp_path / "pem")
+    store, built = PemStore.open(tmp_path / "pem"), build_scene(config)
+    export_glb(store, built, tmp_path / "bowl.glb", samples=[0])
+    glb = Glb((tmp_path / "bowl.glb").read_bytes())
+    jsonschema.validate(glb.extension, SCHEMA)
+    assert glb.extension["projection"] == "paraboloid"
+    assert all(material["doubleSided"] for material in glb.json["materials"])
+    irradiance = store.read_irradiance()
+    assert irradiance is not None
+    assert irradiance.shape[1] == 6
+    attributes = glb.primitives[0]["attributes"]
+    np.testing.assert_array_equal(glb.accessor(attributes["_IRRADIANCE"]), irradiance[:, :3])
+    np.testing.assert_array_equal(glb.accessor(attributes["_IRRADIANCE_BACK"]), irradiance[:, 3:])
+    code = glb.extension["radianceCode"]
+    step = (code["high"] - code["low"]) / 255.0
+    sample = glb.extension["sets"][1]
+    for part in sample["parts"]:
+        for shell in part["shells"]:
+            codes = glb.image(shell["radiance"]).astype(np.float64)
+            assert codes.shape == (12, 16, 3)
+            pyramid = np.maximum(store.read_map(part["name"], shell["name"], 0), 0.0)
+            offset = 0
+            for level in range(4):
+                s = 8 >> level
+                top, left = (0, 0) if level == 0 else (8, sum(2 * (8 >> finer) for finer in range(1, level)))
+                faces = [codes[top : top + s, left + f * s : left + (f + 1) * s] for f in range(2)]
+                radiance = np.exp2(code["low"] + np.stack(faces).reshape(-1, 3) * step) - code["epsilon"]
+                expected = pyramid[offset : offset + 2 * s * s, :3]
+                offset += 2 * s * s
+                bound = (expected + code["epsilon"]) * (2.0 ** (0.5 * step) - 1.0)
+                assert (np.abs(np.maximum(radiance, 0.0) - expected) <= 1.001 * bound + 1e-6).all()
+
+
+def test_only_meshes_that_are_open_are_drawn_from_both_sides() -> None:
+    torus = _core.make_torus((0, 0, 0), 1.0, 0.3, 16)
+    positions, triangles = np.asarray(torus.positions), np.asarray(torus.triangles)
+    assert not has_border(positions, triangles)
+    assert has_border(positions, triangles[1:])

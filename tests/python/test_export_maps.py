@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from mirrorbake import _core
 from mirrorbake.envmap import EnvMap
 from mirrorbake.errors import OptionError
-from mirrorbake.pem.export.frames import FRAMES, move_proxy, turn_cube
+from mirrorbake.pem.export.frames import FRAMES, cube_from_paraboloid, move_proxy, turn_cube
 from mirrorbake.pem.export.map_sets import MapSet, ShellMap
 from mirrorbake.pem.export.maps import export_maps
 from mirrorbake.proxy import proxy_from_attributes
@@ -230,3 +231,71 @@ def test_what_cannot_be_written_is_refused_before_a_folder_is_made(
     with pytest.raises(OptionError, match=message):
         export_maps([], tmp_path / "out", **options)  # type: ignore[arg-type]
     assert not (tmp_path / "out").exists()
+
+
+def paraboloid_directions(size: int) -> NDArray[np.float64]:
+    """Directions (2, size, size, 3) of texels' centres, of EXT_mirrorbake_pem: x / (1 + |z|) inverted."""
+    ticks = (np.arange(size) + 0.5) / size * 2.0 - 1.0
+    x, y = np.meshgrid(ticks, -ticks)
+    z = 1.0 - x**2 - y**2
+    front = np.stack([2.0 * x, 2.0 * y, z], axis=-1) / (1.0 + x**2 + y**2)[..., None]
+    return np.stack([front, front * np.array([1.0, 1.0, -1.0])])
+
+
+def smooth(directions: NDArray[Any]) -> NDArray[np.float32]:
+    unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+    waves = [1.0 + 0.5 * unit[..., 0], 1.0 + 0.3 * unit[..., 1] * unit[..., 2], 1.5 + unit[..., 2]]
+    return np.stack(waves, axis=-1).astype(np.float32)
+
+
+def paraboloid(size: int) -> ShellMap:
+    levels = [smooth(paraboloid_directions(size >> i)).reshape(-1, 3) for i in range(size.bit_length())]
+    return ShellMap("static", INFINITE, size, np.concatenate(levels), "paraboloid")
+
+
+@pytest.mark.parametrize("convention", LABELS)
+def test_dual_paraboloids_become_cube_maps_that_lie_right(convention: str, tmp_path: Path) -> None:
+    said: list[str] = []
+    export_maps(
+        [single(paraboloid(64))], tmp_path, convention=convention, precision="float32", report=said.append
+    )
+    assert said == ["the maps are dual paraboloids: they were resampled, every level by itself"]
+    description = json.loads((tmp_path / "maps.json").read_text())
+    (entry,) = description["sets"][0]["parts"][0]["shells"]
+    assert (entry["projection"], entry["size"], entry["levels"]) == ("cube", 64, 7)
+    cube = EnvMap.load(tmp_path / "static.ktx2")
+    matrix = FRAMES[convention].lookup_matrix
+    for level in range(4):
+        size = 64 >> level
+        directions = labelled(size).astype(np.float64)
+        for face in range(6):
+            values = cube.level(level)[face]
+            # What hardware reads with `matrix @ d` is the value of d.
+            expected = smooth(directions[face] @ matrix.astype(np.float64))
+            # Texels of a coarse paraboloid are up to 2/s of a radian apart from the cube's.
+            assert np.abs(values - expected).max() < 3.0 / size, (level, face)
+
+
+def test_a_panorama_of_a_dual_paraboloid_shows_every_direction(tmp_path: Path) -> None:
+    maps = single(paraboloid(64))
+    export_maps([maps], tmp_path, format="exr", convention="blender", precision="float32")
+    image = EnvMap.load(tmp_path / "static.exr", "latlong").level(0)
+    height, width = image.shape[:2]
+    for u, v in [(0.5, 0.5), (0.75, 0.5), (0.3, 0.8), (0.1, 0.2), (0.9, 0.6), (0.6, 0.95)]:
+        texel = image[min(int((1.0 - v) * height), height - 1), int(u * width)]
+        world = FRAMES["blender"].space_matrix.T @ panorama_direction_of_cycles(u, v)
+        np.testing.assert_allclose(texel, smooth(world), atol=0.03)
+
+
+def test_a_cube_of_a_paraboloid_holds_the_levels_whose_texels_are_its_size() -> None:
+    # Levels of one value each. A texel of the paraboloid is as wide as the cube's at the rim, at +X, and
+    # twice as wide in its middle, at +Z.
+    size = 128
+    values = np.concatenate([np.full(2 * (size >> i) ** 2, i, np.float32) for i in range(8)])
+    layout = _core.EnvMapLayout("dual_paraboloid", size, size, 8, 1)
+    maps = EnvMap(layout, values, ["R"])
+    for level in range(4):
+        s = size >> level
+        found = cube_from_paraboloid(maps, s)
+        assert found[0, s // 2, s // 2, 0] == pytest.approx(level, abs=0.2)
+        assert found[4, s // 2, s // 2, 0] == pytest.approx(max(level - 1, 0), abs=0.2)

@@ -20,7 +20,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.pem.export.blocks import blocks_of, pixels_of
-from mirrorbake.pem.export.images import ImageFormat
+from mirrorbake.pem.export.images import ImageFormat, linear_codes, srgb_codes
 from mirrorbake.pem.export.map_sets import run_time_attributes
 from mirrorbake.pem.export.materials import Materials, export_materials
 from mirrorbake.pem.export.mesh_file import ReflectorMesh
@@ -28,7 +28,7 @@ from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_
 from mirrorbake.pem.export.source import ExportSource, MapEntry, Part, Shell
 from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.pem.pyramid import FACES, Projection, topology_of
-from mirrorbake.pem.run_time import fade_weight
+from mirrorbake.pem.run_time import diffuse_of, fade_weight
 from mirrorbake.pem.shells import moved_proxy
 from mirrorbake.proxy import proxy_from_attributes, proxy_to_attributes
 from mirrorbake.scene.parameters import Axis, ParameterSpace
@@ -69,6 +69,8 @@ class Case:
     segments: int = 40
     """Around the ring; 320 make triangles smaller than a pixel."""
     map_size: int = 32
+    open: bool = False
+    """The ball is a bowl without thickness, whose inner side gets light of its own."""
     trimmed: bool = False
     """Of a sample's texels every second half face alone are its own; the static set has the others."""
 
@@ -153,6 +155,15 @@ def _cube_cases() -> list[Case]:
             segments=320,
             map_size=128,
         ),
+        Case("open", _core.Proxy.infinite(origin), local, schlick, open=True),
+        Case(
+            "open-moving",
+            _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, straight),
+            turned_local,
+            schlick,
+            moves=True,
+            open=True,
+        ),
         Case("trimmed", _core.Proxy.infinite(origin), local, schlick, trimmed=True, fade_degrees=10.0),
         Case("fading", _core.Proxy.infinite(origin), local, schlick, fade_degrees=10.0),
     ]
@@ -172,18 +183,20 @@ def _pose(case: Case, t: float) -> Pose:
 
 
 def _waves(shift: float) -> FloatArray:
-    """A smooth picture of 64² pixels whose channels differ, in [0, 1]."""
+    """A smooth picture of 64² pixels whose channels differ, in [0, 1], of 8 bits as from a file."""
     y, x = np.mgrid[0:64, 0:64] * (2.0 * math.pi / 64.0)
     channels = [0.5 + 0.3 * np.sin(x + shift + c) * np.cos(y - c) + 0.1 * np.sin(2 * y + c) for c in range(3)]
-    return np.stack(channels, axis=-1).astype(np.float32)
+    coded = srgb_codes(np.stack(channels, axis=-1).astype(np.float32)) / 255.0
+    linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    return linear.astype(np.float32)
 
 
 def _bumps() -> FloatArray:
-    """Tangent-space normals that lean by 15° at most."""
+    """Tangent-space normals that lean by 15° at most, of 8 bits as from a file."""
     y, x = np.mgrid[0:64, 0:64] * (2.0 * math.pi / 64.0)
     lean = np.stack([0.2 * np.sin(x) * np.cos(y), 0.2 * np.sin(2 * y), np.ones_like(x)], axis=-1)
     lean /= np.linalg.norm(lean, axis=-1, keepdims=True)
-    return (0.5 + 0.5 * lean).astype(np.float32)
+    return (linear_codes((0.5 + 0.5 * lean).astype(np.float32)) / 255.0).astype(np.float32)
 
 
 def _maps(seed: int, channels: int, size: int, projection: Projection = "cube") -> FloatArray:
@@ -229,13 +242,14 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
         _core.make_sphere((0.0, 0.13, 0.0), 0.06, 32),
     )
     first = np.asarray(torus.positions)
+    ball_triangles = np.asarray(ball.triangles)
+    if case.open:
+        ball_triangles = ball_triangles[np.asarray(ball.positions)[ball_triangles, 1].max(axis=1) < 0.14]
     positions = np.concatenate([first, np.asarray(ball.positions)])
     normals = np.concatenate([np.asarray(torus.normals), np.asarray(ball.normals)])
-    triangles = np.concatenate(
-        [np.asarray(torus.triangles), np.asarray(ball.triangles) + np.uint32(len(first))]
-    )
+    triangles = np.concatenate([np.asarray(torus.triangles), ball_triangles + np.uint32(len(first))])
     parts = np.concatenate(
-        [np.zeros(len(torus.triangles), np.uint16), np.ones(len(ball.triangles), np.uint16)]
+        [np.zeros(len(torus.triangles), np.uint16), np.ones(len(ball_triangles), np.uint16)]
     )
     scene = _core.Scene()
     material = _core.Material(
@@ -284,11 +298,14 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
 
 
 def irradiance(case: Case, normals: FloatArray, sample: int) -> FloatArray:
-    """Of the vertices in a sample: light from above, which turns blue on the way."""
+    """Of the vertices in a sample: light from above, which turns blue on the way; red light on backs."""
     share = sample / (len(PARAMETERS) - 1) if case.moves else 0.0
     colour = np.array([1.0, 0.8, 0.6]) * (1.0 - share) + np.array([0.3, 0.5, 1.0]) * share
     values: FloatArray = ((0.5 + 0.5 * normals[:, 1:2]) * colour).astype(np.float32)
-    return values
+    if not case.open:
+        return values
+    back = ((0.6 - 0.4 * normals[:, 1:2]) * np.array([2.0 - share, 0.3, 0.1 + share])).astype(np.float32)
+    return np.concatenate([values, back], axis=1)
 
 
 def _eye(t: float, raised: float) -> tuple[float, float, float]:
@@ -416,7 +433,7 @@ def reference(case: Case, pem: CasePem, code: RadianceCode, t: float, raised: fl
         parts[1] = [distant]
     normals = scene.mesh.normals
     here = irradiance(case, normals, first) * (1 - weight) + irradiance(case, normals, first + 1) * weight
-    diffuse = _core.diffuse_from_irradiance(samples, scene.mesh.triangles, here)
+    diffuse = diffuse_of(samples, scene.mesh.triangles, here.astype(np.float32))
     return _core.render_reflector(samples, parts, diffuse, case.run_time)
 
 

@@ -160,7 +160,7 @@ export interface Manifest {
   first: number;
 }
 
-const VERSION = 4;
+const VERSION = 5;
 
 const LARGEST_MESH = 1 << 30;
 
@@ -322,6 +322,11 @@ function checkCamera(data: Manifest): void {
   if (!valid) damaged("it has no camera");
 }
 
+/// How many sides of the mesh have an irradiance of their own: 2 where light reaches the backs of its triangles.
+export function litSides(manifest: Manifest): number {
+  return (manifest.mesh.arrays.irradiance?.components ?? 3) / 3;
+}
+
 /// Names of the shells of all parts, each once: what can be switched on and off.
 export function shellNames(manifest: Manifest): string[] {
   return [...new Set(manifest.parts.flatMap((part) => part.shells.map((shell) => shell.name)))];
@@ -362,11 +367,12 @@ function checkFiles(data: Manifest): void {
   const arrays = Object.values(mesh.arrays).every(
     (array) =>
       TYPES.includes(array?.type) &&
-      isIndex(array.components, 5) &&
+      isIndex(array.components, 7) &&
       isIndex(array.count, LARGEST_MESH) &&
       isIndex(array.offset, LARGEST_MESH),
   );
-  if (!arrays) damaged("the mesh is not described");
+  const irradiance = mesh.arrays.irradiance?.components ?? 3;
+  if (!arrays || (irradiance !== 3 && irradiance !== 6)) damaged("the mesh is not described");
   const moves =
     motion === null || (isVector(motion?.to) && isVector(motion.pivot) && Number.isFinite(motion.turn));
   if (!moves) damaged("the object's motion is not described");

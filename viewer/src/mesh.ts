@@ -8,7 +8,7 @@ export interface Mesh {
   normals: Int16Array | null;
   uvs: Uint16Array | null;
   colors: Uint16Array | null;
-  /// Half floats.
+  /// Half floats: three for each vertex, or six with those of the back.
   irradiance: Uint16Array | null;
   indices: Uint32Array;
 }
@@ -72,12 +72,14 @@ export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Pro
   };
 }
 
-/// The irradiance of a sample's vertices, three half floats for each of `count`, filled up to `padded` vertices.
+/// The irradiance of a sample's vertices, three half floats for each of `count`, filled up to `padded` vertices; with two `sides`
+/// that of the fronts first, then that of the backs.
 export async function decodeIrradiance(
   name: string,
   file: ArrayBuffer,
   count: number,
   padded: number,
+  sides: number,
 ): Promise<Uint16Array> {
   const damaged = new UserError(
     "damaged",
@@ -89,8 +91,11 @@ export async function decodeIrradiance(
   } catch {
     throw damaged;
   }
-  if (payload.length !== 6 * count) throw damaged;
-  const values = new Uint16Array(3 * padded);
-  values.set(new Uint16Array(gather(payload, { type: "float16", components: 3, count, offset: 0 })));
+  if (payload.length !== 6 * sides * count) throw damaged;
+  const values = new Uint16Array(3 * sides * padded);
+  for (let side = 0; side < sides; ++side) {
+    const array: MeshArray = { type: "float16", components: 3, count, offset: 6 * side * count };
+    values.set(new Uint16Array(gather(payload, array)), 3 * side * padded);
+  }
   return values;
 }

@@ -8,7 +8,7 @@ import { degreesOutside, fadeWeight } from "./fade";
 import { type Files, textOf } from "./files";
 import { irradianceTexels } from "./gl/map_pool";
 import { type FrameState, Renderer } from "./gl/renderer";
-import { type Axis, type Manifest, type MapFiles, parseManifest, type Vec3 } from "./manifest";
+import { type Axis, litSides, type Manifest, type MapFiles, parseManifest, type Vec3 } from "./manifest";
 import {
   add,
   type ImageWindow,
@@ -352,7 +352,7 @@ export class Scene {
     const { renderer, manifest } = this;
     const bytes = await this.files.read(file);
     const { count } = manifest.mesh.arrays.positions;
-    const values = await decodeIrradiance(file, bytes, count, irradianceTexels(manifest));
+    const values = await decodeIrradiance(file, bytes, count, irradianceTexels(manifest), litSides(manifest));
     if (renderer === this.renderer) renderer.pool.uploadIrradiance(slot, values);
   }
 

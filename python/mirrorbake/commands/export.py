@@ -111,7 +111,7 @@ def export_command(
     web: WebFolder = None,
     single_file: SingleFile = False,
     exact: ExactImages = False,
-    quality: ImageQuality = 95,
+    quality: ImageQuality = 91,
     fallback: ExactFallback = True,
     references: WithReferences = True,
     trim: OnlyRead = True,

@@ -1,6 +1,6 @@
 import { faceCount, layerSize } from "../atlas";
 import { UserError } from "../errors";
-import type { Manifest } from "../manifest";
+import { litSides, type Manifest } from "../manifest";
 import type { Counters } from "./program";
 import { IRRADIANCE_ROW } from "./shaders";
 
@@ -11,10 +11,10 @@ export function sampleBytes(manifest: Manifest): number {
   const { width, height } = layerSize(largestSize(manifest));
   const { maps, alphas } = mapCounts(manifest);
   const texels = faceCount(manifest.projection) * width * height;
-  return texels * (4 * maps + alphas) + 6 * irradianceTexels(manifest);
+  return texels * (4 * maps + alphas) + 6 * litSides(manifest) * irradianceTexels(manifest);
 }
 
-/// Texels of a sample's irradiance: one for each vertex, whole rows of them; 0 where it does not change.
+/// Texels of a side of a sample's irradiance: one for each vertex, whole rows of them; 0 where it does not change.
 export function irradianceTexels(manifest: Manifest): number {
   if (manifest.samples[0].irradiance === null) return 0;
   return IRRADIANCE_ROW * Math.ceil(manifest.mesh.arrays.positions.count / IRRADIANCE_ROW);
@@ -43,6 +43,7 @@ export class MapPool {
   private readonly alpha: WebGLTexture | null;
   private readonly irradiance: WebGLTexture | null = null;
   private readonly irradianceRows: number;
+  private readonly sides: number;
   private readonly faces: number;
   private readonly slots: number;
   private readonly maps: number;
@@ -82,9 +83,11 @@ export class MapPool {
     const radianceLayers = faces * (this.slots * maps + 1);
     const alphaLayers = Math.max(faces * this.slots * alphas, 1);
     this.irradianceRows = irradianceTexels(manifest) / IRRADIANCE_ROW;
+    this.sides = litSides(manifest);
+    const irradianceLayers = this.sides * this.capacity;
     this.bytes =
       width * height * (4 * radianceLayers + alphaLayers) +
-      6 * IRRADIANCE_ROW * this.irradianceRows * this.capacity;
+      6 * IRRADIANCE_ROW * this.irradianceRows * irradianceLayers;
     this.radiance = this.texture(gl.RGB9_E5, width, height, radianceLayers, gl.LINEAR);
     this.alpha = this.texture(gl.R8, width, height, alphaLayers, gl.LINEAR);
     if (this.irradianceRows > 0) {
@@ -92,7 +95,7 @@ export class MapPool {
         gl.RGB16F,
         IRRADIANCE_ROW,
         this.irradianceRows,
-        this.capacity,
+        irradianceLayers,
         gl.NEAREST,
       );
     }
@@ -156,19 +159,19 @@ export class MapPool {
     return this.irradiance !== null;
   }
 
-  /// Half floats, three for every texel (irradianceTexels).
+  /// Half floats, three for every texel (irradianceTexels) of each side.
   uploadIrradiance(slot: number, values: Uint16Array): void {
-    const { gl, irradianceRows } = this;
+    const { gl, irradianceRows, sides } = this;
     gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.irradiance);
     gl.texSubImage3D(
       gl.TEXTURE_2D_ARRAY,
       0,
       0,
       0,
-      slot,
+      sides * slot,
       IRRADIANCE_ROW,
       irradianceRows,
-      1,
+      sides,
       gl.RGB,
       gl.HALF_FLOAT,
       values,

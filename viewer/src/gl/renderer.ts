@@ -2,7 +2,7 @@
 
 import { layerSize } from "../atlas";
 import { UserError } from "../errors";
-import { type Manifest, type Range, shellNames } from "../manifest";
+import { litSides, type Manifest, type Range, shellNames } from "../manifest";
 import type { View } from "../math";
 import type { Mesh } from "../mesh";
 import { nodeCount } from "../space";
@@ -164,16 +164,23 @@ export class Renderer {
       count: number,
       type: number,
       normalised: boolean,
+      stride = 0,
     ) => {
       gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
       gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
       gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, count, type, normalised, 0, 0);
+      gl.vertexAttribPointer(place, count, type, normalised, stride, 0);
       ++this.counters.allocated;
     };
     attribute(0, mesh.positions as BufferSource, 3, gl.UNSIGNED_SHORT, true);
     if (mesh.normals) attribute(1, mesh.normals as BufferSource, 2, gl.SHORT, true);
-    if (mesh.irradiance) attribute(2, mesh.irradiance as BufferSource, 3, gl.HALF_FLOAT, false);
+    if (mesh.irradiance) {
+      const sides = litSides(this.manifest);
+      attribute(2, mesh.irradiance as BufferSource, 3, gl.HALF_FLOAT, false, 6 * sides);
+      // The same buffer again: what the backs have of their own, or the fronts' where there is nothing.
+      gl.enableVertexAttribArray(5);
+      gl.vertexAttribPointer(5, 3, gl.HALF_FLOAT, false, 6 * sides, 6 * (sides - 1));
+    }
     if (mesh.uvs) attribute(3, mesh.uvs as BufferSource, 2, gl.UNSIGNED_SHORT, true);
     if (mesh.colors) attribute(4, mesh.colors as BufferSource, 3, gl.UNSIGNED_SHORT, true);
     else gl.vertexAttrib3f(4, 1, 1, 1);
@@ -419,6 +426,7 @@ export class Renderer {
     gl.uniform1f(program.at("uStaticLayer"), pool.staticLayer());
     gl.uniform1i(program.at("uCaptured"), content === "pem" && hasMaps ? 0 : 1);
     gl.uniform1i(program.at("uIrradiance"), IRRADIANCE_UNIT);
+    gl.uniform1i(program.at("uSides"), litSides(manifest));
     gl.uniform1i(program.at("uIrradianceChanges"), pool.hasIrradiance && frame.hasSamples ? 1 : 0);
     gl.uniform1fv(program.at("uSlot"), this.slots);
     this.surfaces.set(program, range.material, frame.fresnelOn, frame.diffuseOn);

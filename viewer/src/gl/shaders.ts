@@ -26,6 +26,7 @@ layout(location = 1) in vec2 aNormal;
 layout(location = 2) in vec3 aIrradiance;
 layout(location = 3) in vec2 aUv;
 layout(location = 4) in vec3 aColor;
+layout(location = 5) in vec3 aBackIrradiance;
 uniform mat4 uClipFromWorld;
 uniform vec2 uShift;  // of the image, in clip space
 uniform vec3 uLow;
@@ -36,12 +37,14 @@ uniform vec2 uTurn;  // cosine and sine of the object's turn about the vertical 
 uniform vec3 uPivot;
 uniform vec3 uOffset;
 uniform bool uIrradianceChanges;
-uniform sampler2DArray uIrradiance;
+uniform sampler2DArray uIrradiance;  // of a slot's sample one layer, or two: fronts and backs
+uniform int uSides;
 uniform float uSlot[NODES];
 uniform float uWeight[NODES];
 out vec3 vPosition;
 out vec3 vNormal;
 out vec3 vIrradiance;
+out vec3 vBackIrradiance;
 out vec2 vUv;
 out vec3 vColor;
 
@@ -61,11 +64,14 @@ void main() {
   vUv = uUvLow + aUv * uUvExtent;
   vColor = aColor;
   vIrradiance = aIrradiance;
+  vBackIrradiance = aBackIrradiance;
   if (uIrradianceChanges) {
     ivec2 texel = ivec2(gl_VertexID % ${IRRADIANCE_ROW}, gl_VertexID / ${IRRADIANCE_ROW});
-    vIrradiance = vec3(0.0);
+    vIrradiance = vBackIrradiance = vec3(0.0);
     for (int i = 0; i < NODES; ++i) {
-      vIrradiance += uWeight[i] * texelFetch(uIrradiance, ivec3(texel, int(uSlot[i])), 0).rgb;
+      int layer = uSides * int(uSlot[i]);
+      vIrradiance += uWeight[i] * texelFetch(uIrradiance, ivec3(texel, layer), 0).rgb;
+      vBackIrradiance += uWeight[i] * texelFetch(uIrradiance, ivec3(texel, layer + uSides - 1), 0).rgb;
     }
   }
   gl_Position = uClipFromWorld * vec4(vPosition, 1.0);
@@ -253,6 +259,7 @@ export function meshFragment(shells: number, mixed: number, projection: Projecti
 in vec3 vPosition;
 in vec3 vNormal;
 in vec3 vIrradiance;
+in vec3 vBackIrradiance;
 in vec2 vUv;
 in vec3 vColor;
 out vec4 oColour;
@@ -348,6 +355,12 @@ vec3 bend(vec3 view, vec3 n, vec3 g) {
   return size > 0.0 ? middle / size : g;
 }
 
+// A lookup stands for a part of the pixel, and so does what it reads of a texture.
+vec3 readTexture(sampler2D image, mat3x2 imageFromUv, vec2 uv, vec2 ux, vec2 uy) {
+  vec2 dx = uFootprint * (imageFromUv * vec3(ux, 0.0)), dy = uFootprint * (imageFromUv * vec3(uy, 0.0));
+  return textureGrad(image, imageFromUv * vec3(uv, 1.0), dx, dy).rgb;
+}
+
 // Tracer's front_normal with the texture of mapped_normal (glTF 2.0 §3.9.3): v of the coordinates counts downwards, that of the
 // texels upwards. \`front\` is the geometric normal of the triangle's front.
 vec3 frontNormal(vec3 interpolated, vec3 front, vec2 uv, vec3 px, vec3 py, vec2 ux, vec2 uy) {
@@ -362,8 +375,7 @@ vec3 frontNormal(vec3 interpolated, vec3 front, vec2 uv, vec3 px, vec3 py, vec2 
   t /= size;
   vec3 b = cross(n, t);
   if (dot(b, turn * (px * uy.x - py * ux.x)) < 0.0) b = -b;
-  vec2 dx = uNormalFromUv * vec3(ux, 0.0), dy = uNormalFromUv * vec3(uy, 0.0);
-  vec3 texel = 2.0 * textureGrad(uNormalTexture, uNormalFromUv * vec3(uv, 1.0), dx, dy).rgb - 1.0;
+  vec3 texel = 2.0 * readTexture(uNormalTexture, uNormalFromUv, uv, ux, uy) - 1.0;
   vec3 bent = uNormalScale * (texel.x * t + texel.y * b) + texel.z * n;
   return length(bent) > 1e-6 && dot(bent, front) > 0.0 ? normalize(bent) : n;
 }
@@ -404,7 +416,8 @@ void main() {
   vec3 px = dFdx(vPosition), py = dFdy(vPosition);
   vec3 nx = dFdx(vNormal), ny = dFdy(vNormal);
   vec2 ux = dFdx(vUv), uy = dFdy(vUv);
-  vec3 ix = dFdx(vIrradiance), iy = dFdy(vIrradiance);
+  vec3 reached = gl_FrontFacing ? vIrradiance : vBackIrradiance;
+  vec3 ix = dFdx(reached), iy = dFdy(reached);
   float e11 = dot(px, px), e12 = dot(px, py), e22 = dot(py, py);
   float determinant = e11 * e22 - e12 * e12;
   vec3 g = cross(px, py);
@@ -426,7 +439,7 @@ void main() {
   vec3 position = vPosition + pixels.x * px + pixels.y * py;
   vec3 normal = vNormal + pixels.x * nx + pixels.y * ny;
   vec2 uv = vUv + pixels.x * ux + pixels.y * uy;
-  vec3 irradiance = max(vIrradiance + pixels.x * ix + pixels.y * iy, 0.0);
+  vec3 irradiance = max(reached + pixels.x * ix + pixels.y * iy, 0.0);
 
   vec3 toEye = uEye - position;
   float range = length(toEye);
@@ -479,10 +492,10 @@ void main() {
     }
   }
   vec3 r0 = uR0 * (uColorsTint ? vColor : vec3(1.0));
-  if (uTextured.y) r0 *= texture(uReflectanceTexture, uReflectanceFromUv * vec3(uv, 1.0)).rgb;
+  if (uTextured.y) r0 *= readTexture(uReflectanceTexture, uReflectanceFromUv, uv, ux, uy);
   vec3 f = fresnel(dot(n, view), r0);
   vec3 albedo = uAlbedo * vColor;
-  if (uTextured.x) albedo *= texture(uAlbedoTexture, uAlbedoFromUv * vec3(uv, 1.0)).rgb;
+  if (uTextured.x) albedo *= readTexture(uAlbedoTexture, uAlbedoFromUv, uv, ux, uy);
   vec3 body = uDiffuseOn * albedo * (irradiance * 0.3183098861837907) * (uCoated ? 1.0 - f : vec3(1.0));
   oColour = vec4(min(light * f + body, 65000.0), 1.0);
 }

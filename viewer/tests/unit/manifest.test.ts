@@ -34,7 +34,7 @@ function written() {
   ];
   return {
     format: "mirrorbake-web",
-    version: 4,
+    version: 5,
     library: "0.1.0",
     title: "teapot",
     notes: [],

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.envmap import EnvMap
 
 # Directions of the centre, the right and the bottom of every face in OpenGL, Direct3D and Vulkan.
 _FACES = np.array(
@@ -110,6 +111,32 @@ def turn_cube(level: FloatArray, lookup_from_world: NDArray[np.int64]) -> FloatA
             source_right, source_down = source_down, source_right
         turned[face] = texels[:: int(down @ source_down), :: int(right @ source_right)]
     return turned
+
+
+def cube_from_paraboloid(level_maps: EnvMap, size: int) -> FloatArray:
+    """A level of a cube map as a lookup reads it from the levels of a dual paraboloid.
+
+    Each texel is the lookup in the direction of its centre with a footprint of one texel: from the two levels
+    of the paraboloid whose texels are next in size to the cube's there. Levels that were inferred stay what
+    they are for.
+
+    Parameters
+    ----------
+    level_maps
+        All levels of the dual paraboloid.
+    size
+        Texels along a side of the cube's level.
+
+    Returns
+    -------
+    array
+        Shape (6, size, size, C), our orientation.
+    """
+    places = (2.0 * np.arange(size) + 1.0) / size - 1.0
+    centre, right, down = (_FACES[:, None, None, k, :].astype(np.float64) for k in range(3))
+    directions = centre + places[None, None, :, None] * right + places[None, :, None, None] * down
+    steps = [np.broadcast_to(2.0 / size * step, directions.shape) for step in (right, down)]
+    return level_maps.sample(directions, *steps, filter="trilinear")
 
 
 def axis(name: str) -> NDArray[np.float64]:

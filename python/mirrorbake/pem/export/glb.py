@@ -18,6 +18,7 @@ from mirrorbake.pem.export.map_sets import (
     static_set,
 )
 from mirrorbake.pem.export.materials import export_materials
+from mirrorbake.pem.export.mesh_file import has_border
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from mirrorbake.scene.build import BuiltScene
 
 EXTENSION = "EXT_mirrorbake_pem"
-EXTENSION_VERSION = 2
+EXTENSION_VERSION = 3
 TEXTURE_SIZE = 2048
 """Pixels along a side that textures of the material have at most."""
 _BRIGHT_PERCENTILE = 99.0
@@ -82,6 +83,7 @@ def export_glb(
         "version": EXTENSION_VERSION,
         "runTime": run_time_of(store),
         "axes": axis_descriptions(store.header.space),
+        "projection": store.header.projection,
         "radianceCode": {"low": code.low, "high": code.high, "epsilon": code.epsilon},
         "sets": [_add_set(file, maps, code) for maps in sets()],
     }
@@ -116,11 +118,14 @@ def _add_materials(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Return glTF's materials, and a sentence for each thing that they lack."""
     result, notes, added = [], list(exported.notes), dict[int, int]()
+    open_shell = has_border(built.positions, built.triangles)
     for number, entry in zip(numbers, exported.materials, strict=True):
         material = built.scene.material(number)
         described, lacking = gltf_material(material)
         notes += lacking
         described.setdefault("extensions", {})
+        if open_shell:
+            described["doubleSided"] = True
         add_textures(described, entry, exported.textures, file, TEXTURE_SIZE, added)
         described["extensions"][EXTENSION] = {
             "fresnel": fresnel_description(material.fresnel),
@@ -171,7 +176,7 @@ def _add_set(file: GlbFile, maps: MapSet, code: RadianceCode) -> dict[str, Any]:
 
 
 def _add_shell(file: GlbFile, name: str, shell: ShellMap, code: RadianceCode) -> dict[str, Any]:
-    radiance = to_atlas(code.encode(shell.pyramid[:, :3]), shell.size)
+    radiance = to_atlas(code.encode(shell.pyramid[:, :3]), shell.size, shell.projection)
     entry: dict[str, Any] = {
         "name": shell.name,
         "proxy": _proxy(shell.proxy),
@@ -182,7 +187,7 @@ def _add_shell(file: GlbFile, name: str, shell: ShellMap, code: RadianceCode) ->
         entry["offHull"] = True
     if shell.channels == 4:
         alpha = np.rint(255.0 * np.clip(shell.pyramid[:, 3:], 0.0, 1.0)).astype(np.uint8)
-        atlas = to_atlas(alpha, shell.size).astype(np.uint8)
+        atlas = to_atlas(alpha, shell.size, shell.projection).astype(np.uint8)
         entry["alpha"] = file.add_png(f"{name} alpha", atlas[..., 0])
     return entry
 
@@ -219,6 +224,8 @@ def _add_mesh(
     irradiance = store.read_irradiance()
     if irradiance is not None:
         attributes["_IRRADIANCE"] = file.add_vertices(np.ascontiguousarray(irradiance[:, :3]))
+        if irradiance.shape[1] > 3:
+            attributes["_IRRADIANCE_BACK"] = file.add_vertices(np.ascontiguousarray(irradiance[:, 3:]))
     local = store.read_local_triangles()
     stacked = np.ones(len(built.triangles), np.bool_) if local is None else local != 0
     primitives = []

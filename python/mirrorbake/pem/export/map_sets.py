@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mirrorbake import _core
-from mirrorbake.errors import InputError, OptionError
+from mirrorbake.errors import OptionError
+from mirrorbake.pem.pyramid import FACES, pyramid_of
 from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.shells import moved_proxy
 from mirrorbake.scene.config_axes import arranged
@@ -17,8 +17,10 @@ from mirrorbake.scene.load import parse_config
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from mirrorbake import _core
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
+    from mirrorbake.pem.pyramid import Projection
     from mirrorbake.pem.shells import Shell
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.parameters import ParameterSpace, Point
@@ -35,6 +37,7 @@ class ShellMap:
     """Texels along a side of a face of the finest level."""
     pyramid: FloatArray
     """(texels, C), float32: all levels, the finest first; opaque RGB, or premultiplied RGBA."""
+    projection: Projection = "cube"
     off_hull: bool = False
     """Triangles on the reflector's convex hull do not read it."""
 
@@ -49,10 +52,11 @@ class ShellMap:
         return self.size.bit_length()
 
     def level(self, index: int) -> FloatArray:
-        """Level of shape (6, s, s, C), s = size >> index."""
-        start = sum(6 * (self.size >> i) ** 2 for i in range(index))
+        """Level of shape (F, s, s, C), s = size >> index; F faces of the projection."""
+        faces = FACES[self.projection]
+        start = sum(faces * (self.size >> i) ** 2 for i in range(index))
         side = self.size >> index
-        return self.pyramid[start : start + 6 * side * side].reshape(6, side, side, self.channels)
+        return self.pyramid[start : start + faces * side * side].reshape(faces, side, side, self.channels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,22 +100,11 @@ def fade_degrees(store: PemStore) -> float | None:
     return None if fade is None else float(fade["degrees"])
 
 
-def require_cubes(store: PemStore) -> None:
-    """Raise InputError for a PEM whose maps are no cubes, which exports are made of."""
-    projection = store.header.projection
-    if projection != "cube":
-        raise InputError(
-            f'{store.location}: maps.projection = "{projection}": exports hold cube maps alone; '
-            'bake with maps.projection = "cube" to another folder'
-        )
-
-
 def static_set(store: PemStore) -> MapSet:
     """The set that needs no parameter: the PEM's static set at the object's place at rest.
 
     A PEM without one has the captured surroundings instead, on the outermost shell's geometry.
     """
-    require_cubes(store)
     header = store.header
     stored = store.read_static_maps()
     if stored is not None:
@@ -121,7 +114,8 @@ def static_set(store: PemStore) -> MapSet:
         ]
         return MapSet("static", None, _parts(header, texels.__getitem__, lambda shell: shell.proxy))
     proxy = header.static["proxy"] or header.static["infinite"]
-    shell = ShellMap("static", proxy, header.map_size, _core.build_cube_pyramid(store.read_capture()))
+    pyramid = pyramid_of(store.read_capture(), header.projection)
+    shell = ShellMap("static", proxy, header.map_size, pyramid, header.projection)
     return MapSet("static", None, {part.name: [shell] for part in header.parts})
 
 
@@ -133,7 +127,6 @@ def sample_set(store: PemStore, index: int) -> MapSet:
     OptionError
         There is no such sample.
     """
-    require_cubes(store)
     header = store.header
     count = len(header.space)
     if not 0 <= index < count:
@@ -165,6 +158,7 @@ def _parts(
             proxy_of(shell),
             header.map_size,
             read(header.map_of(part, shell.name)),
+            header.projection,
             off_hull=shell.polygons == "off hull",
         )
         known.append((shell, made))

@@ -12,12 +12,20 @@ from mirrorbake import _core
 from mirrorbake.envmap import EnvMap
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.files import write_text
-from mirrorbake.pem.export.frames import FRAMES, Frame, move_proxy, source_from_panorama, turn_cube
+from mirrorbake.pem.export.frames import (
+    FRAMES,
+    Frame,
+    cube_from_paraboloid,
+    move_proxy,
+    source_from_panorama,
+    turn_cube,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
+    from mirrorbake.arrays import FloatArray
     from mirrorbake.literals import FaceLayout, PixelFormat
     from mirrorbake.pem.export.map_sets import MapSet, ShellMap
 
@@ -98,16 +106,25 @@ def export_maps(
         "axes": list(axes),
         "sets": [],
     }
-    clamped = 0
+    clamped, resampled = 0, False
     for maps in sets:
+        resampled = resampled or any(
+            shell.projection != "cube" for shells in maps.parts.values() for shell in shells
+        )
         entry, count = _write_set(maps, folder, frame, format, precision)
         description["sets"].append(entry)
         clamped += count
     write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=1) + "\n")
-    if clamped and report is not None:
-        report(
+    notes = []
+    if resampled:
+        notes.append("the maps are dual paraboloids: they were resampled, every level by itself")
+    if clamped:
+        notes.append(
             f"{clamped} values beyond ±65504 were clamped to what half floats hold; use float32 to keep them"
         )
+    for note in notes if report is not None else ():
+        assert report is not None
+        report(note)
     return description
 
 
@@ -172,6 +189,17 @@ def _describe(shell: ShellMap, frame: Frame, files: list[str], format: str) -> d
     }
 
 
+def _cube_levels(shell: ShellMap) -> list[FloatArray]:
+    """All levels (6, s, s, C) as cube maps; a dual paraboloid gives a cube with as many texels a side."""
+    if shell.projection == "cube":
+        return [shell.level(i) for i in range(shell.levels)]
+    size = shell.size
+    layout = _core.EnvMapLayout("dual_paraboloid", size, size, shell.levels, shell.channels)
+    channels = ["R", "G", "B", "A"][: shell.channels]
+    maps = EnvMap(layout, np.ascontiguousarray(shell.pyramid).reshape(-1), channels)
+    return [cube_from_paraboloid(maps, size >> i) for i in range(shell.levels)]
+
+
 def _write_shell(
     shell: ShellMap, folder: Path, stem: str, frame: Frame, format: str, precision: str
 ) -> tuple[list[str], int]:
@@ -182,10 +210,11 @@ def _write_shell(
         return envmap.save(folder / name, faces=faces, format=cast("PixelFormat", precision)).clamped_to_half
 
     if format == "exr" and frame.panorama is not None:
-        finest = EnvMap.from_array(shell.level(0), "cube", channels)
+        projection = "cube" if shell.projection == "cube" else "dual_paraboloid"
+        finest = EnvMap.from_array(shell.level(0), projection, channels)
         panorama = finest.resample("latlong", 2 * shell.size, source_from_target=source_from_panorama(frame))
         return [f"{stem}.exr"], save(panorama, f"{stem}.exr")
-    levels = [turn_cube(shell.level(i), frame.lookup_matrix) for i in range(shell.levels)]
+    levels = [turn_cube(level, frame.lookup_matrix) for level in _cube_levels(shell)]
     if format == "exr":
         names = [f"{stem}.level{i}.exr" for i in range(shell.levels)]
         clamped = [

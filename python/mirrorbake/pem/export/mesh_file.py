@@ -35,7 +35,27 @@ class ReflectorMesh:
     materials: NDArray[np.uint16]
     """(T,) material of every triangle."""
     irradiance: FloatArray | None
-    """(V, 3) at rest, W/m², or None for a body that is black."""
+    """(V, 3) at rest, W/m², or (V, 6) with that of the backs; None for a body that is black."""
+
+
+def has_border(positions: FloatArray, triangles: NDArray[np.uint32]) -> bool:
+    """Return whether a mesh is open somewhere, so that backs of its triangles can be seen.
+
+    Vertices at one place are one. Every edge of a closed surface is run through as often in one way as in the
+    other.
+
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+    >>> tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.uint32)
+    >>> has_border(corners, tetrahedron), has_border(corners, tetrahedron[:3])
+    (False, True)
+    """
+    _, welded = np.unique(positions, axis=0, return_inverse=True)
+    corners = welded.reshape(-1)[triangles].astype(np.int64)
+    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    ways = np.sign(edges[:, 1] - edges[:, 0])
+    _, edge = np.unique(low * len(positions) + high, return_inverse=True)
+    return bool(np.any(np.bincount(edge.reshape(-1), ways) != 0.0))
 
 
 def octahedral(normals: FloatArray) -> NDArray[np.int16]:
@@ -103,7 +123,7 @@ def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
 
 
 def write_irradiance(irradiance: FloatArray, mesh: ReflectorMesh) -> bytes:
-    """Encode the irradiance (V, 3) of another sample, its vertices in the order of the mesh's file."""
+    """Encode the irradiance (V, 3|6) of another sample, its vertices in the order of the mesh's file."""
     order = np.lexsort((~mesh.whole_stack, mesh.materials, mesh.parts))
     used = vertex_order(mesh.triangles[order])
     payload, _ = _pack({"irradiance": irradiance[used].astype(np.float16)})

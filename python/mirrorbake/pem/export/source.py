@@ -85,7 +85,7 @@ class ExportSource:
     mesh: ReflectorMesh
     materials: Materials
     irradiance: Callable[[int], FloatArray] | None
-    """`irradiance(sample)`: (V, 3) where the diffuse layer changes from sample to sample, else None."""
+    """`irradiance(sample)`: (V, 3|6) as the mesh has it, where it changes between samples, else None."""
     static: FloatArray
     """All levels of the static map, (texels, 3)."""
     static_proxy: dict[str, Any]
@@ -129,7 +129,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
     def irradiance(sample: int) -> FloatArray:
         values = store.read_irradiance(sample)
         assert values is not None
-        return values[:, :3]
+        return values
 
     first = store.read_irradiance()
     changes = first is not None and store.has_irradiance_per_sample
@@ -168,7 +168,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
             uvs=np.asarray(mesh.uvs) if materials.textures else np.zeros((0, 2), np.float32),
             colors=np.asarray(mesh.colors),
             materials=np.array([numbers.index(number) for number in of_part], np.uint16)[built.parts],
-            irradiance=None if first is None else first[:, :3],
+            irradiance=first,
         ),
         materials=materials,
         irradiance=irradiance if changes else None,

@@ -31,20 +31,21 @@ if TYPE_CHECKING:
     from mirrorbake.pem.export.source import ExportSource
 
 FORMAT_NAME = "mirrorbake-web"
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 MANIFEST_NAME = "manifest.json"
 
 PROBED_SAMPLES = 16
 """Samples that are read to find the range of the radiance; brighter texels of others are clamped."""
 
 
-STATIC_SET_QUALITY = 35
+STATIC_SET_QUALITY = 50
 """By which the static set's AVIF images are worse: where it shows, it is far from ray tracing by itself."""
 
+ALPHA_QUALITY = 6
+"""By which images of α are worse than the radiance of samples."""
 
-OTHER_QUALITY = 20
-"""By which α, the captured surroundings and the stills are worse than the radiance of samples: of α a better
-image is not seen, the others are looked at and not looked up."""
+OTHER_QUALITY = 35
+"""By which the captured surroundings and the stills are worse: they are looked at and not looked up."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ class WebPem:
         form = self._options.format
         if sample is None:
             form = _worse(form, STATIC_SET_QUALITY)
-        grey = _worse(form, OTHER_QUALITY)
+        grey = _worse(form, ALPHA_QUALITY)
         for m, entry in enumerate(self._source.maps):
             self._add(f"{folder}/{m}", partial(self._radiance, pyramid, m, sample), form)
             if not entry.opaque:

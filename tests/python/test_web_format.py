@@ -324,9 +324,9 @@ def test_a_sample_holds_what_is_read_near_it_and_the_static_set_the_rest() -> No
     manifest = json.loads(web.read("manifest.json"))
     for sample in manifest["samples"]:
         bits = np.unpackbits(np.frombuffer(gzip.decompress(web.read(sample["blocks"])), np.uint8))
-        # 96 × 96 pixels; four rows of 32 texels are four blocks.
-        assert len(bits) == len(source.maps) * 144
-        assert bits.sum() == len(source.maps) * 4
+        # 96 × 96 pixels; four rows of 32 texels are eight blocks.
+        assert len(bits) == len(source.maps) * 576
+        assert bits.sum() == len(source.maps) * 8
     name = manifest["samples"][0]["maps"][0]["radiance"] + ".avif"
     assert len(web.read(name)) < 0.5 * len(whole.read(name))
     # A page can put a sample together as soon as its files are there.

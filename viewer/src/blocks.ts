@@ -6,7 +6,7 @@ import type { MapEntry, Projection } from "./manifest";
 import { inflate } from "./mesh";
 
 /// Pixels along a side.
-const BLOCK = 8;
+const BLOCK = 4;
 
 function blockCounts(width: number, height: number): { across: number; down: number } {
   return { across: Math.ceil(width / BLOCK), down: Math.ceil(height / BLOCK) };

@@ -111,7 +111,7 @@ def export_command(
     web: WebFolder = None,
     single_file: SingleFile = False,
     exact: ExactImages = False,
-    quality: ImageQuality = 91,
+    quality: ImageQuality = 93,
     fallback: ExactFallback = True,
     references: WithReferences = True,
     trim: OnlyRead = True,

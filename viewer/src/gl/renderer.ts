@@ -6,6 +6,7 @@ import { litSides, type Manifest, type Range, shellNames } from "../manifest";
 import type { View } from "../math";
 import type { Mesh } from "../mesh";
 import { nodeCount } from "../space";
+import * as images from "./image_shaders";
 import { IRRADIANCE_UNIT, MapPool } from "./map_pool";
 import { type Counters, Program } from "./program";
 import { type Motion, Proxies } from "./proxies";
@@ -112,13 +113,13 @@ export class Renderer {
     for (const part of manifest.parts) this.meshProgram(part.shells.length);
     this.background = new Program(
       gl,
-      shaders.FULL_VERTEX,
+      images.FULL_VERTEX,
       shaders.backgroundFragment(manifest.projection),
       this.counters,
     );
-    this.still = new Program(gl, shaders.FULL_VERTEX, shaders.STILL_FRAGMENT, this.counters);
-    this.copy = new Program(gl, shaders.FULL_VERTEX, shaders.COPY_FRAGMENT, this.counters);
-    this.display = new Program(gl, shaders.FULL_VERTEX, shaders.DISPLAY_FRAGMENT, this.counters);
+    this.still = new Program(gl, images.FULL_VERTEX, images.STILL_FRAGMENT, this.counters);
+    this.copy = new Program(gl, images.FULL_VERTEX, images.COPY_FRAGMENT, this.counters);
+    this.display = new Program(gl, images.FULL_VERTEX, images.DISPLAY_FRAGMENT, this.counters);
     this.empty = gl.createVertexArray();
     this.vertices = this.uploadMesh(mesh);
     this.flat = mesh.normals === null;

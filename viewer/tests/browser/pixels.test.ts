@@ -13,7 +13,8 @@ interface Reference {
   width: number;
   height: number;
   distance: number;
-  pictures: { file: string; parameter: number; elevation: number }[];
+  /// `web`: dB of the C++ renderer's picture to this one, if this one is ray traced.
+  pictures: { file: string; parameter: number; elevation: number; web?: number }[];
 }
 
 function srgb(linear: number): number {
@@ -47,6 +48,10 @@ afterAll(async () => {
   await browser.close();
 });
 
+function referenceOf(name: string): Reference {
+  return JSON.parse(readFileSync(join(CASES, name, "reference.json"), "utf8"));
+}
+
 async function compare(name: string): Promise<number[]> {
   const site: Site = await serve(join(CASES, name));
   const { page, context, errors } = await open(browser, site.url, {
@@ -58,7 +63,7 @@ async function compare(name: string): Promise<number[]> {
       return scene?.cache.ready === 3 && scene.isComplete;
     },
   });
-  const reference: Reference = JSON.parse(readFileSync(join(CASES, name, "reference.json"), "utf8"));
+  const reference = referenceOf(name);
   const { width, height, distance } = reference;
   const figures = [];
   for (const picture of reference.pictures) {
@@ -157,4 +162,22 @@ describe("the page's pixels against the C++ renderer", () => {
     // Noise on every texel is the worst that an image codec can be given.
     for (const figure of figures) expect(figure).toBeGreaterThan(30);
   });
+});
+
+describe("the page's pixels against ray tracing", () => {
+  // What the specification allows: the rasteriser's grid at silhouettes, and what the image codec loses.
+  for (const name of ["traced-exact", "traced-avif"]) {
+    test(`are at most 0.3 dB below the C++ renderer's in the case ${name}`, async () => {
+      const figures = await compare(name);
+      const { pictures } = referenceOf(name);
+      expect(figures.length).toBe(2);
+      figures.forEach((figure, k) => {
+        const { web } = pictures[k];
+        console.log(name, figure.toFixed(2), "dB, in C++", web?.toFixed(2));
+        // A picture that is nowhere near would be as far for both.
+        expect(web).toBeGreaterThan(25);
+        expect(figure).toBeGreaterThan((web ?? 0) - 0.3);
+      });
+    });
+  }
 });

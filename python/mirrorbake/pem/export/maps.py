@@ -22,7 +22,7 @@ from mirrorbake.pem.export.frames import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from mirrorbake.arrays import FloatArray
@@ -115,17 +115,19 @@ def export_maps(
         description["sets"].append(entry)
         clamped += count
     write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=1) + "\n")
-    notes = []
+    if report is not None:
+        for note in _notes(resampled, clamped):
+            report(note)
+    return description
+
+
+def _notes(resampled: bool, clamped: int) -> Iterator[str]:
     if resampled:
-        notes.append("the maps are dual paraboloids: they were resampled, every level by itself")
+        yield "the maps are dual paraboloids: they were resampled, every level by itself"
     if clamped:
-        notes.append(
+        yield (
             f"{clamped} values beyond ±65504 were clamped to what half floats hold; use float32 to keep them"
         )
-    for note in notes if report is not None else ():
-        assert report is not None
-        report(note)
-    return description
 
 
 def _safe(name: str) -> str:

@@ -38,13 +38,13 @@ PROBED_SAMPLES = 16
 """Samples that are read to find the range of the radiance; brighter texels of others are clamped."""
 
 
-STATIC_SET_QUALITY = 50
+STATIC_SET_QUALITY = 52
 """By which the static set's AVIF images are worse: where it shows, it is far from ray tracing by itself."""
 
 ALPHA_QUALITY = 6
 """By which images of α are worse than the radiance of samples."""
 
-OTHER_QUALITY = 35
+OTHER_QUALITY = 40
 """By which the captured surroundings and the stills are worse: they are looked at and not looked up."""
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mirrorbake.bake.bake import bake
+from mirrorbake.envmap import EnvMap
 from mirrorbake.evaluate.evaluate import evaluate
+from mirrorbake.pem.store import PemStore
+from mirrorbake.pem.verify import verify
 from mirrorbake.scene.config import SceneConfig
 from mirrorbake.scene.load import load_config, parse_override
 from mirrorbake.scene.parameters import space_of
@@ -67,9 +71,47 @@ def test_the_mesh_example_takes_any_mesh_and_panorama(tmp_path: Path, mesh: str,
         ("dome", {"azimuth": 10, "elevation": 5}),
         ("moving-object", {"motion": 11}),
         ("turning-light", {"light": 11}),
+        ("static-set", {}),
     ],
 )
 def test_the_examples_of_other_spaces_span_them(name: str, axes: dict[str, int]) -> None:
-    # What is over such spaces is baked, smaller, in test_bake_spaces.
     space = space_of(load_config(EXAMPLES / f"{name}.toml"))
     assert {axis.name: len(axis.values) for axis in space.axes} == axes
+
+
+SMALL = (
+    "reflector.subdivisions=3",
+    "reflector.parts=split",
+    "views.size=[24,24]",
+    "maps.size=8",
+    "trace.samples=2",
+    "trace.indirect=none",
+    "static.views=0",
+    "auto.quality=draft",
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "fewer", "samples"),
+    [
+        ("static-set", ["views.count=4"], 1),
+        ("teapot-room", ["views.count=3", "views.degrees=10"], 3),
+        ("dome", ["views.count=2", "views.rings=2"], 4),
+        ("moving-object", ["motion.count=2"], 2),
+        ("turning-light", ["light.count=3"], 3),
+    ],
+)
+def test_an_example_of_every_parameter_space_is_baked_whole(
+    name: str, fewer: list[str], samples: int, tmp_path: Path
+) -> None:
+    sky = np.random.default_rng(5).uniform(0.2, 1.0, (16, 32, 3)).astype(np.float32)
+    EnvMap.from_array(sky, "latlong").save(tmp_path / "sky.exr")
+    panorama = [f"surroundings.panorama={tmp_path}/sky.exr"] if name == "turning-light" else []
+    config = load_config(
+        EXAMPLES / f"{name}.toml", [parse_override(text) for text in (*SMALL, *fewer, *panorama)]
+    )
+    bake(config, tmp_path / "pem")
+    store = PemStore.open(tmp_path / "pem")
+    assert len(store.header.space) == samples
+    assert store.completed().all()
+    assert verify(tmp_path / "pem").is_sound

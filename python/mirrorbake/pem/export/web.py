@@ -38,7 +38,7 @@ PROBED_SAMPLES = 16
 """Samples that are read to find the range of the radiance; brighter texels of others are clamped."""
 
 
-STATIC_SET_QUALITY = 52
+STATIC_SET_QUALITY = 57
 """By which the static set's AVIF images are worse: where it shows, it is far from ray tracing by itself."""
 
 ALPHA_QUALITY = 6
@@ -155,7 +155,7 @@ class WebPem:
             self._makers[f"exact/{name}{exact.suffix}"] = lambda: exact.encode(pixels())
 
     def _poster(self) -> bytes:
-        return ImageFormat(exact=False, quality=70).encode(
+        return ImageFormat(exact=False, quality=50).encode(
             srgb_bytes(tone_map(self._source.still(self._first)))
         )
 

@@ -377,6 +377,10 @@ the cache.)")
       .def_prop_ro(
           "scene", [](const Tracer& tracer) -> const Scene& { return tracer.scene(); },
           nb::rv_policy::reference_internal)
+      .def("with_parts", &Tracer::with_parts, nb::arg("object"), nb::arg("parts"), nb::arg("part_names"),
+           nb::arg("part_materials"), nb::call_guard<nb::gil_scoped_release>(),
+           R"(The same scene with an object cut into other parts, `parts` giving that of every triangle; what
+was gathered is kept, so this is much faster than a new tracer. No triangle may change its material.)")
       .def(
           "trace_beauty",
           [](const Tracer& tracer, const Camera& camera, const TraceOptions& options) {

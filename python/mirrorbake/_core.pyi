@@ -1323,6 +1323,12 @@ class Tracer:
     @property
     def scene(self) -> Scene: ...
 
+    def with_parts(self, object: int, parts: Sequence[int], part_names: Sequence[str], part_materials: Sequence[int]) -> Tracer:
+        """
+        The same scene with an object cut into other parts, `parts` giving that of every triangle; what
+        was gathered is kept, so this is much faster than a new tracer. No triangle may change its material.
+        """
+
     def trace_beauty(self, camera: Camera, options: TraceOptions = ...) -> NDArray[numpy.float32]:
         """Image of everything: (height, width, 3) float32 radiance."""
 

@@ -189,8 +189,7 @@ glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, floa
 glm::vec3 emitted_light(const World& world, const Ray& ray, const Hit& hit, const Surface& surface, float pdf,
                         Effort effort) {
   if (!(pdf > 0.0F) || surface.emission == glm::vec3(0.0F)) return surface.emission;
-  const float other =
-      world.lights.mesh_pdf(surface.object, surface.geometric_normal, ray, hit.distance, effort);
+  const float other = world.lights.mesh_pdf(hit, surface.geometric_normal, ray, effort);
   return power_heuristic(pdf, other) * surface.emission;
 }
 

@@ -35,6 +35,8 @@ constexpr int kLeastLaterRays = 4;
 
 IrradianceCache::IrradianceCache() = default;
 IrradianceCache::~IrradianceCache() = default;
+IrradianceCache::IrradianceCache(const IrradianceCache&) = default;
+IrradianceCache& IrradianceCache::operator=(const IrradianceCache&) = default;
 IrradianceCache::IrradianceCache(IrradianceCache&&) noexcept = default;
 IrradianceCache& IrradianceCache::operator=(IrradianceCache&&) noexcept = default;
 

@@ -27,6 +27,8 @@ class IrradianceCache {
   IrradianceCache();
   IrradianceCache(const World& world, const TracerOptions& options);
   ~IrradianceCache();
+  IrradianceCache(const IrradianceCache&);
+  IrradianceCache& operator=(const IrradianceCache&);
   IrradianceCache(IrradianceCache&&) noexcept;
   IrradianceCache& operator=(IrradianceCache&&) noexcept;
 

@@ -8,6 +8,7 @@
 
 #include "barycentric.hpp"
 #include "cdf.hpp"
+#include "mirrorbake/core/parallel.hpp"
 #include "sample_stream.hpp"
 #include "surface.hpp"
 
@@ -177,6 +178,43 @@ void Lights::add_sphere(std::size_t i) {
   add(Kind::sphere, i, light.radiance, 4.0 * std::numbers::pi * std::numbers::pi * radius * radius);
 }
 
+// Mean luminance that each triangle emits, 0 where its part does not, by samples no further apart than texels
+// and at most kMostAcross along an edge. Bright texels that slip through them are made up for in add_mesh().
+std::vector<double> Lights::triangle_emission(const Object& object) const {
+  constexpr int kMostAcross = 16;
+  std::vector<double> emission(object.mesh.triangles.size(), 0.0);
+  parallel_for(emission.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const Material& material = scene_->materials[static_cast<std::size_t>(material_of(object, k))];
+      emission[k] = static_cast<double>(luminance(material.emission));
+      if (!(emission[k] > 0.0) || material.emission_texture.texture < 0) continue;
+      const auto triangle = static_cast<std::uint32_t>(k);
+      const auto at = [&](glm::vec2 barycentric) {
+        return texture_coordinates(material.emission_texture, uv_at(object.mesh, triangle, barycentric));
+      };
+      const Texture& texture = scene_->textures[static_cast<std::size_t>(material.emission_texture.texture)];
+      const glm::vec2 size = texture.file ? glm::vec2(texture.file->width(), texture.file->height())
+                                          : glm::vec2(texture.image.width, texture.image.height);
+      const float edge = std::max(glm::length(size * (at({1.0F, 0.0F}) - at({0.0F, 0.0F}))),
+                                  glm::length(size * (at({0.0F, 1.0F}) - at({0.0F, 0.0F}))));
+      const int across = std::clamp(static_cast<int>(std::min(edge, 1e6F)) + 1, 1, kMostAcross);
+      double sum = 0.0;
+      int count = 0;
+      for (int i = 0; i < across; ++i) {
+        for (int j = 0; i + j < across; ++j) {
+          const glm::vec2 barycentric =
+              (glm::vec2(static_cast<float>(i), static_cast<float>(j)) + 1.0F / 3.0F) /
+              static_cast<float>(across);
+          sum += static_cast<double>(luminance(material.emission * texture_lookup(texture, at(barycentric))));
+          ++count;
+        }
+      }
+      emission[k] = sum / count;
+    }
+  });
+  return emission;
+}
+
 void Lights::add_mesh(std::size_t i) {
   const Object& object = scene_->objects[i];
   // By material, in the order of materials_of().
@@ -192,31 +230,51 @@ void Lights::add_mesh(std::size_t i) {
   const auto emits = [](glm::vec3 emission) { return luminance(emission) > 0.0F; };
   if (std::none_of(emissions.begin(), emissions.end(), emits)) return;
   // Parts that do not emit have no area to choose a point from.
+  Mesh& mesh = meshes_[i];
   std::vector<double> areas;
-  glm::dvec3 flux(0.0);
-  double emitting = 0.0;
+  std::vector<glm::vec3> means;
+  double area = 0.0;
   for (std::size_t k = 0; k < object.mesh.triangles.size(); ++k) {
     const auto found = std::find(materials.begin(), materials.end(), material_of(object, k));
     const glm::vec3 emission = emissions[static_cast<std::size_t>(found - materials.begin())];
     const glm::uvec3& t = object.mesh.triangles[k];
     const glm::dvec3 a = object.mesh.positions[t.x];
-    const double area = 0.5 * glm::length(glm::cross(glm::dvec3(object.mesh.positions[t.y]) - a,
-                                                     glm::dvec3(object.mesh.positions[t.z]) - a));
-    areas.push_back(emits(emission) ? area : 0.0);
-    flux += areas.back() * glm::dvec3(emission);
-    emitting += areas.back();
+    const double of_one = 0.5 * glm::length(glm::cross(glm::dvec3(object.mesh.positions[t.y]) - a,
+                                                       glm::dvec3(object.mesh.positions[t.z]) - a));
+    if (!emits(emission) || !(of_one > 0.0)) continue;
+    mesh.triangles.push_back(static_cast<std::uint32_t>(k));
+    areas.push_back(of_one);
+    means.push_back(emission);
+    area += of_one;
   }
-  if (!(emitting > 0.0)) return;
-  const glm::vec3 emission = materials.size() == 1 ? emissions.front() : glm::vec3(flux / emitting);
-  Mesh& mesh = meshes_[i];
-  mesh.area_cdf.resize(areas.size() + 1);
-  mesh.area =
-      static_cast<float>(normalise_cdf(mesh.area_cdf.data(), areas.data(), static_cast<int>(areas.size())));
+  if (mesh.triangles.empty()) return;
+  const std::vector<double> emission = triangle_emission(object);
+  double power = 0.0;
+  for (std::size_t n = 0; n < areas.size(); ++n) power += areas[n] * emission[mesh.triangles[n]];
+  // By what they emit, and a tenth by area alone: no place that emits may be left out, however small.
+  constexpr double kByArea = 0.1;
+  std::vector<double> shares;
+  glm::dvec3 mean(0.0);
+  for (std::size_t n = 0; n < areas.size(); ++n) {
+    const double by_area = areas[n] / area;
+    const double by_power = power > 0.0 ? areas[n] * emission[mesh.triangles[n]] / power : by_area;
+    shares.push_back(kByArea * by_area + (1.0 - kByArea) * by_power);
+    mean += by_area * glm::dvec3(means[n]);
+  }
+  mesh.cdf.resize(shares.size() + 1);
+  normalise_cdf(mesh.cdf.data(), shares.data(), static_cast<int>(shares.size()));
+  mesh.area = static_cast<float>(area);
+  mesh.density.assign(object.mesh.triangles.size(), 0.0F);
+  for (std::size_t n = 0; n < areas.size(); ++n) {
+    // Of the intervals as they were rounded.
+    const double share = static_cast<double>(mesh.cdf[n + 1]) - static_cast<double>(mesh.cdf[n]);
+    mesh.density[mesh.triangles[n]] = static_cast<float>(share / areas[n]);
+  }
   mesh.is_reflected = (object.visibility & Visibility::reflection) != Visibility::none;
   const Bounds& bounds = rays_->object_bounds(static_cast<int>(i));
   mesh.centre = 0.5F * (bounds.min + bounds.max);
   mesh.radius = 0.5F * glm::length(bounds.max - bounds.min);
-  add(Kind::mesh, i, emission, static_cast<double>(mesh.area) * std::numbers::pi);
+  add(Kind::mesh, i, materials.size() == 1 ? emissions.front() : glm::vec3(mean), area * std::numbers::pi);
 }
 
 void Lights::add(Kind kind, std::size_t index, glm::vec3 strength, double power_of_one) {
@@ -285,8 +343,8 @@ std::optional<LightSample> Lights::sample_mesh(int object, glm::vec3 position, g
   const auto index = static_cast<std::size_t>(object);
   const Mesh& mesh = meshes_[index];
   const TriangleMesh& source = scene_->objects[index].mesh;
-  const CdfSample t = sample_cdf(mesh.area_cdf.data(), static_cast<int>(source.triangles.size()), u.x);
-  const auto triangle = static_cast<std::uint32_t>(t.index);
+  const CdfSample t = sample_cdf(mesh.cdf.data(), static_cast<int>(mesh.triangles.size()), u.x);
+  const std::uint32_t triangle = mesh.triangles[static_cast<std::size_t>(t.index)];
   const glm::uvec3 corner = source.triangles[triangle];
   const std::span<const glm::vec3> p = rays_->positions(object);
   const float root = std::sqrt(t.place);
@@ -306,7 +364,8 @@ std::optional<LightSample> Lights::sample_mesh(int object, glm::vec3 position, g
     emission *= texture_lookup(*scene_, material.emission_texture, uv);
   }
   if (has_gaps(material)) emission *= opacity_at(*scene_, material, uv);
-  const float pdf = distance * distance / (mesh.area * cosine);
+  const float pdf = mesh.density[triangle] * distance * distance / cosine;
+  if (emission == glm::vec3(0.0F) || !(pdf > 0.0F)) return std::nullopt;
   return LightSample{direction, distance, emission / pdf, mesh.is_reflected ? pdf : 0.0F};
 }
 
@@ -369,13 +428,12 @@ float Lights::hit_pdf(int light, const Ray& ray, float distance, Effort effort) 
   return cosine > 0.0F ? samples * distance * distance / (r.area * cosine) : 0.0F;
 }
 
-float Lights::mesh_pdf(int object, glm::vec3 geometric_normal, const Ray& ray, float distance,
-                       Effort effort) const {
-  const auto index = static_cast<std::size_t>(object);
+float Lights::mesh_pdf(const Hit& hit, glm::vec3 geometric_normal, const Ray& ray, Effort effort) const {
   const float cosine = -glm::dot(ray.direction, geometric_normal);
-  if (!(cosine > 0.0F) || light_of_mesh_[index] < 0) return 0.0F;
-  return mean_samples(light_of_mesh_[index], ray.origin, effort) * distance * distance /
-         (meshes_[index].area * cosine);
+  const int light = light_of_mesh_[hit.geometry];
+  if (!(cosine > 0.0F) || light < 0) return 0.0F;
+  return mean_samples(light, ray.origin, effort) * meshes_[hit.geometry].density[hit.triangle] *
+         hit.distance * hit.distance / cosine;
 }
 
 }  // namespace mirrorbake::tracing

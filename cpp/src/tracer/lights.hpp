@@ -68,7 +68,7 @@ class Lights {
   glm::vec3 hit_radiance(int light, const Ray& ray) const;
   /// Densities with which the direction of a hit on a light or an emissive mesh is taken at the ray's origin.
   float hit_pdf(int light, const Ray& ray, float distance, Effort effort) const;
-  float mesh_pdf(int object, glm::vec3 geometric_normal, const Ray& ray, float distance, Effort effort) const;
+  float mesh_pdf(const Hit& hit, glm::vec3 geometric_normal, const Ray& ray, Effort effort) const;
 
  private:
   enum class Kind { rectangle, sphere, point, directional, spot, mesh, environment };
@@ -86,8 +86,11 @@ class Lights {
     double width, height;
   };
   struct Mesh {
-    std::vector<float> area_cdf;  ///< triangles + 1, in [0,1]
-    float area = 0.0F;
+    std::vector<std::uint32_t> triangles;  ///< of the parts that emit
+    std::vector<float> cdf;                ///< their number + 1, in [0,1]
+    /// Per triangle of the object: probability density of its points, m⁻²; 0: it does not emit.
+    std::vector<float> density;
+    float area = 0.0F;  ///< of what emits
     glm::vec3 centre{0.0F};
     float radius = 0.0F;       ///< about the centre
     bool is_reflected = true;  ///< rays that leave surfaces see it
@@ -104,6 +107,7 @@ class Lights {
   void add_rectangle(std::size_t i);
   void add_sphere(std::size_t i);
   void add_mesh(std::size_t i);
+  std::vector<double> triangle_emission(const Object& object) const;
   void share_by_power();
 
   /// Luminance of the irradiance that a light may bring to a place, roughly; 0 only where it brings none.

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <utility>
+
 #include "world.hpp"
 
 namespace mirrorbake {
 
 struct Tracer::State {
   State(Scene scene, const TracerOptions& options);
+  State(Scene scene, const tracing::Indirect& known) : lit(std::move(scene), known) {}
 
   tracing::LitWorld lit;
 

@@ -61,6 +61,8 @@ struct Indirect {
 /// All that the integrators need.
 struct LitWorld {
   LitWorld(Scene scene, const TracerOptions& options) : world(std::move(scene)), indirect(world, options) {}
+  /// A scene of the same surfaces as another, in which light gets about alike.
+  LitWorld(Scene scene, const Indirect& known) : world(std::move(scene)), indirect(known) {}
 
   World world;
   Indirect indirect;

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.capture_place import capture_place
 from mirrorbake.bake.count_parts import parts_decision
 from mirrorbake.bake.probe import (
     LOBE_PROBE_SAMPLES,
@@ -23,7 +24,6 @@ from mirrorbake.bake.shell_shapes import (
     MIN_HITS,
     choose_shape,
     planned_shells,
-    reflector_origin,
     shell_distances,
     shells_decision,
 )
@@ -228,12 +228,15 @@ def _hull_split(stage: Stage, on_hull: NDArray[np.bool_], *, any_local: bool) ->
 
 def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
     maps, built = stage.config.maps, stage.built
-    origin = reflector_origin(stage)
+    place = capture_place(stage)
+    origin = place.position
+    moved = "" if place.inside is None else f"; seen from beside {place.inside!r}, which is in its middle"
     wanted: str | None = maps.distant
     if stage.config.shells is not None and stage.config.shells[-1].proxy != "auto":
         wanted = stage.config.shells[-1].proxy
     if wanted == "infinite":
-        return Decision("maps.distant", None, wanted, False, _SET, None), _core.Proxy.infinite(origin)
+        decision = Decision("maps.distant", None, wanted, False, _SET + moved, None)
+        return decision, _core.Proxy.infinite(origin)
     distances = shell_distances(stage, probe, len(stage.shell_rules) - 1)
     usable = distances > 0.0
     radius = 0.5 * float(np.linalg.norm(np.ptp(built.positions, axis=0)))
@@ -243,7 +246,7 @@ def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
             raise InputError(
                 f"maps.distant = {wanted!r}: the object sees no surroundings at a distance to fit it to"
             )
-        reason = "the object sees no surroundings at a distance"
+        reason = f"the object sees no surroundings at a distance{moved}"
         return Decision("maps.distant", None, "infinite", True, reason, None), _core.Proxy.infinite(origin)
     choice = choose_shape(probe, distances, usable, origin)
     best = choice.best
@@ -254,8 +257,8 @@ def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
         hits = probe.position[near] + distances[near, None] * probe.reflection[near]
         proxy = _fit_box(maps.box, hits, origin, float(built.positions[:, 1].min()))
     if wanted is not None:
-        return Decision("maps.distant", None, wanted, False, _SET, None), proxy
-    reason = choice.reason.removeprefix(f"{best.name}: ").removesuffix(".")
+        return Decision("maps.distant", None, wanted, False, _SET + moved, None), proxy
+    reason = choice.reason.removeprefix(f"{best.name}: ").removesuffix(".") + moved
     return Decision("maps.distant", None, best.name, True, reason, best.off_view_error), proxy
 
 

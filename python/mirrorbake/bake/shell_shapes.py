@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.capture_place import capture_place
 from mirrorbake.bake.probe import probe_points
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, proxy_to_attributes
@@ -31,12 +32,6 @@ FLAT = 0.02
 """Thickness of a flat thing over its distance from the object."""
 SEEN = 1e-3
 """Share of a part's rays below which it has no map of a shell."""
-
-
-def reflector_origin(stage: Stage) -> tuple[float, float, float]:
-    """Return the place from which all maps but the local ones are seen: the middle of the object."""
-    x, y, z = _core.area_weighted_centroid(stage.built.positions, stage.built.triangles)
-    return (float(x), float(y), float(z))
 
 
 def shell_distances(stage: Stage, probe: Probe, shell: int) -> FloatArray:
@@ -124,7 +119,7 @@ def fit_shape(stage: Stage, probe: Probe, shell: int, wanted: str) -> _core.Prox
     InputError
         A finite shape is wanted for what no ray meets, or a plane for what lies around the object.
     """
-    origin = reflector_origin(stage)
+    origin = capture_place(stage).position
     if wanted == "infinite":
         return _core.Proxy.infinite(origin)
     distances = shell_distances(stage, probe, shell)

@@ -107,8 +107,8 @@ Draft = Annotated[
     bool | None,
     typer.Option(
         "--draft/--full",
-        help="A first look in a minute or two: 9 views on 16 degrees, 256 x 256 pixels, maps of 128, "
-        "32 samples, where the scene says nothing else. [default: draft without a SCENE.toml, else full]",
+        help="A first look in a minute or two: 9 views on 16 degrees, 256 x 256 pixels, maps of 128, 32 "
+        "to 64 samples, where the scene says nothing else. [default: draft without a SCENE.toml, else full]",
         show_default=False,
     ),
 ]

@@ -116,7 +116,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 DRAFT: Mapping[str, Mapping[str, Any]] = {
     "views": {"count": 9, "degrees": 16.0, "size": [256, 256]},
     "maps": {"size": 128},
-    "trace": {"samples": 32},
+    "trace": {"samples": 32, "most_samples": 64},
 }
 """Values for a first bake of a minute or two."""
 

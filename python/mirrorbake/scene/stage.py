@@ -75,7 +75,16 @@ class Stage:
         if parts not in self.cut:
             reflector = self.config.reflector.model_copy(update={"parts": parts})
             self.cut.clear()
-            self.cut[parts] = _prepared(self.config.model_copy(update={"reflector": reflector}), None)
+            config = self.config.model_copy(update={"reflector": reflector})
+            built = build_scene(config)
+            # Light gets about as before: the tracer keeps what it has gathered.
+            tracer = self.tracer.with_parts(
+                built.reflector,
+                built.parts.tolist(),
+                built.scene.object_part_names(built.reflector),
+                built.scene.object_part_materials(built.reflector),
+            )
+            self.cut[parts] = Stage(config, built, tracer)
         return self.cut[parts]
 
     @property

@@ -127,8 +127,8 @@ class Tracer {
   const Scene& scene() const;
 
   /// The same scene with an object cut into other parts: that of every triangle, and what Object says of
-  /// them. What was gathered is kept, so this is much faster than a new tracer. Throws InvalidArgument where a
-  /// triangle would have another material.
+  /// them. What was gathered is kept, so this is much faster than a new tracer. Throws InvalidArgument where
+  /// a triangle would have another material.
   Tracer with_parts(int object, std::vector<std::uint16_t> parts, std::vector<std::string> part_names,
                     std::vector<int> part_materials) const;
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.bake.capture_place import capture_place
 from mirrorbake.bake.count_parts import parts_decision
+from mirrorbake.bake.distant import distant_decision
 from mirrorbake.bake.probe import (
     LOBE_PROBE_SAMPLES,
     Probe,
@@ -20,15 +20,9 @@ from mirrorbake.bake.probe import (
     relative_spread,
 )
 from mirrorbake.bake.quality import QUALITIES, quality_decisions
-from mirrorbake.bake.shell_shapes import (
-    MIN_HITS,
-    choose_shape,
-    planned_shells,
-    shell_distances,
-    shells_decision,
-)
+from mirrorbake.bake.shell_shapes import planned_shells
+from mirrorbake.bake.split_shells import shells_decision
 from mirrorbake.bake.worth import advice_of, shared_distant
-from mirrorbake.errors import InputError
 from mirrorbake.proxy import hull_triangles, proxy_to_attributes
 from mirrorbake.scene.config_shells import DEFAULT_SHELLS, ITSELF
 from mirrorbake.scene.plan import Decision, Plan
@@ -38,7 +32,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from mirrorbake.arrays import FloatArray
     from mirrorbake.scene.config import Parts
     from mirrorbake.scene.stage import Stage
 
@@ -55,9 +48,6 @@ SMALLEST_MAP, LARGEST_MAP = 16, 1024
 """A scene file may set other sizes."""
 TEXELS_PER_LOBE = 4
 """Texels along a rough lobe's width at half of its height: more show nothing new."""
-
-LARGEST_BOX = 1e5
-"""Radii of the object; hits further away are as good as infinite and do not shape the walls of a box."""
 
 _SET = "set in the scene"
 
@@ -84,8 +74,12 @@ def analyze(stage: Stage) -> Plan:
         probe = Probe.of(stage, cast("int", depth.value))
     elif labels is not None:
         probe = replace(probe, part=labels[probe.triangle].astype(np.int64))
-    shells = shells_decision(stage)
-    distant, proxy = _distant(stage, probe)
+    _, single = distant_decision(stage, probe)
+    shells, found = shells_decision(stage, probe, cast("int", depth.value), single)
+    if found is not None:
+        stage = replace(stage, config=stage.config.model_copy(update={"shells": found}))
+        probe = Probe.of(stage, cast("int", depth.value))
+    distant, proxy = distant_decision(stage, probe)
     on_hull = hull_triangles(stage.built.positions, stage.built.triangles)[probe.triangle]
     local = _local(stage, probe, on_hull)
     samples = _samples(stage, cast("int", depth.value))
@@ -103,7 +97,7 @@ def analyze(stage: Stage) -> Plan:
         shared_distant(stage, probe, proxy),
         *quality_decisions(stage, cast("int", samples.value)),
     ]
-    advice = advice_of(stage, probe, proxy, cast("int", size.value))
+    advice = advice_of(stage, probe, single, cast("int", size.value))
     has_local = {name: _is_local(local, name) for name in stage.built.part_names}
     planned = planned_shells(stage, probe, has_local, proxy)
     return Plan(tuple(decisions), proxy_to_attributes(proxy), planned, tuple(advice))
@@ -224,48 +218,6 @@ def _hull_split(stage: Stage, on_hull: NDArray[np.bool_], *, any_local: bool) ->
     share = float(np.mean(on_hull))
     reason = f"{share:.0%} of what the views see lies on the convex hull and cannot reflect the object"
     return Decision("layers.hull_split", None, share > 0.0, True, reason, share)
-
-
-def _distant(stage: Stage, probe: Probe) -> tuple[Decision, _core.Proxy]:
-    maps, built = stage.config.maps, stage.built
-    place = capture_place(stage)
-    origin = place.position
-    moved = "" if place.inside is None else f"; seen from beside {place.inside!r}, which is in its middle"
-    wanted: str | None = maps.distant
-    if stage.config.shells is not None and stage.config.shells[-1].proxy != "auto":
-        wanted = stage.config.shells[-1].proxy
-    if wanted == "infinite":
-        decision = Decision("maps.distant", None, wanted, False, _SET + moved, None)
-        return decision, _core.Proxy.infinite(origin)
-    distances = shell_distances(stage, probe, len(stage.shell_rules) - 1)
-    usable = distances > 0.0
-    radius = 0.5 * float(np.linalg.norm(np.ptp(built.positions, axis=0)))
-    near = usable & (distances < LARGEST_BOX * radius)
-    if int(near.sum()) < MIN_HITS:
-        if wanted is not None:
-            raise InputError(
-                f"maps.distant = {wanted!r}: the object sees no surroundings at a distance to fit it to"
-            )
-        reason = f"the object sees no surroundings at a distance{moved}"
-        return Decision("maps.distant", None, "infinite", True, reason, None), _core.Proxy.infinite(origin)
-    choice = choose_shape(probe, distances, usable, origin)
-    best = choice.best
-    if wanted is not None:
-        best = next(candidate for candidate in choice.candidates if candidate.name == wanted)
-    proxy = best.proxy
-    if best.name == "box" and maps.box != "angle":
-        hits = probe.position[near] + distances[near, None] * probe.reflection[near]
-        proxy = _fit_box(maps.box, hits, origin, float(built.positions[:, 1].min()))
-    if wanted is not None:
-        return Decision("maps.distant", None, wanted, False, _SET + moved, None), proxy
-    reason = choice.reason.removeprefix(f"{best.name}: ").removesuffix(".") + moved
-    return Decision("maps.distant", None, best.name, True, reason, best.off_view_error), proxy
-
-
-def _fit_box(how: str, hits: FloatArray, origin: Sequence[float], bottom: float) -> _core.Proxy:
-    if how == "mean_distance":
-        return _core.fit_box_mean_distance(hits, origin, bottom)
-    return _core.fit_box_robust(hits, origin)
 
 
 def _map_size(stage: Stage, proxy: _core.Proxy) -> Decision:

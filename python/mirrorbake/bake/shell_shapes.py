@@ -12,7 +12,7 @@ from mirrorbake.bake.probe import probe_points
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, proxy_to_attributes
 from mirrorbake.scene.config_shells import DEFAULT_SHELLS
-from mirrorbake.scene.plan import Decision, PlannedShell
+from mirrorbake.scene.plan import PlannedShell
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -34,6 +34,26 @@ SEEN = 1e-3
 """Share of a part's rays below which it has no map of a shell."""
 
 
+def traced_hits(stage: Stage, probe: Probe, hidden: Sequence[int]) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Return what a probe's reflected rays meet: lengths (n,) in metres, and numbers of objects (n,).
+
+    Nothing: infinite and -1, which lights have too. Hidden are objects by number, `ShellRule.ITSELF` the
+    reflector.
+    """
+    distances = np.empty(len(probe.view), np.float32)
+    objects = np.empty(len(probe.view), np.int32)
+    for number, point in enumerate(probe_points(stage)):
+        chosen = probe.view == number
+        moved = stage.at(point)
+        reflector = moved.built.reflector
+        distances[chosen], objects[chosen] = moved.tracer.intersect_distance(
+            np.ascontiguousarray(probe.position[chosen]),
+            np.ascontiguousarray(probe.reflection[chosen]),
+            sorted({reflector if i == _core.ShellRule.ITSELF else i for i in hidden}),
+        )
+    return distances, objects
+
+
 def shell_distances(stage: Stage, probe: Probe, shell: int) -> FloatArray:
     """Return lengths (n,) of a probe's reflected rays, metres, up to what a shell holds of them.
 
@@ -41,25 +61,11 @@ def shell_distances(stage: Stage, probe: Probe, shell: int) -> FloatArray:
     it. 0 where the ray meets another shell's; the last one's rays may be infinite.
     """
     rules = stage.shell_rules
-    distances = np.empty(len(probe.view), np.float32)
-    objects = np.empty(len(probe.view), np.int32)
-    for number, point in enumerate(probe_points(stage)):
-        chosen = probe.view == number
-        moved = stage.at(point)
-        reflector = moved.built.reflector
-
-        def numbers(rule: _core.ShellRule, reflector: int = reflector) -> list[int]:
-            return [reflector if i == rule.ITSELF else i for i in rule.objects]
-
-        hidden = set[int]() if reflector in numbers(rules[shell]) else {reflector}
-        for rule in rules[:shell]:
-            if not rule.has_limits:
-                hidden |= set(numbers(rule))
-        distances[chosen], objects[chosen] = moved.tracer.intersect_distance(
-            np.ascontiguousarray(probe.position[chosen]),
-            np.ascontiguousarray(probe.reflection[chosen]),
-            sorted(hidden),
-        )
+    itself = _core.ShellRule.ITSELF
+    before = [i for rule in rules[:shell] if not rule.has_limits for i in rule.objects]
+    distances, objects = traced_hits(
+        stage, probe, before if itself in rules[shell].objects else [itself, *before]
+    )
     held = np.zeros(len(distances), np.bool_)
     for k, rule in enumerate(rules[: shell + 1]):
         mine = rule.holds(objects, distances, stage.built.reflector).astype(np.bool_) & ~held
@@ -178,15 +184,3 @@ def planned_shells(
             proxy = proxy_to_attributes(fit_shape(stage, probe, number, shell.proxy))
         planned.append(PlannedShell(shell.name, proxy, tuple(parts)))
     return (*planned, PlannedShell(shells[-1].name, proxy_to_attributes(last), tuple(names)))
-
-
-def shells_decision(stage: Stage) -> Decision:
-    """Return the list of shells as a decision; "auto" is what [PEM] §4 has."""
-    wanted = stage.config.shells
-    tables = [
-        {key: list(value) if isinstance(value, tuple) else value for key, value in table.items()}
-        for table in (shell.model_dump(exclude_defaults=True) for shell in wanted or DEFAULT_SHELLS)
-    ]
-    if wanted is not None:
-        return Decision("shells", None, tables, False, "set in the scene", None)
-    return Decision("shells", None, tables, True, "what the object reflects of itself, and the rest", None)

@@ -324,7 +324,8 @@ class SceneConfig(Section):
     """None: the light stays as it is."""
     layers: Layers = Layers()
     shells: Annotated[Shells | None, BeforeValidator(as_tuple), *AUTO] = None
-    """[[shells]], front to back. "auto": `local`, the object where it is seen in itself, and the rest."""
+    """[[shells]], front to back. "auto": `local`, the object where it is seen in itself, and the rest,
+    from which what is near or on a plane is split where that is worth its maps."""
     maps: Maps = Maps()
     trace: Trace = Trace()
     infer: Infer = Infer()

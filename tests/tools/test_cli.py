@@ -173,6 +173,13 @@ def test_every_command_explains_itself(command: str) -> None:
         ["render", "dir", "--frames", "2", "--away", "1,0", "--out", "a{}.png"],
         ["sheet"],
         ["export", "dir"],
+        ["export", "dir", "--glb", "a.gltf"],
+        ["export", "dir", "--glb", "a.glb", "--convention", "unity"],
+        ["export", "dir", "--maps", "a", "--fps", "3"],
+        ["export", "dir", "--video", "a.mp4", "--all"],
+        ["export", "dir", "--web", "a.html"],
+        ["export", "dir", "--web", "a", "--single-file"],
+        ["export", "dir", "--web", "a", "--exact", "--quality", "90"],
     ],
 )
 def test_wrong_usage_is_exit_2(tmp_path: Path, arguments: list[str]) -> None:

@@ -134,12 +134,16 @@ export class Controls {
             },
           ),
         ),
-        this.check(
-          "diffuse",
-          "diffuse",
-          (s) => s.diffuse,
-          (on) => ({ diffuse: on }),
-        ),
+        ...(manifest.mesh.arrays.irradiance
+          ? [
+              this.check(
+                "diffuse",
+                "diffuse",
+                (s) => s.diffuse,
+                (on) => ({ diffuse: on }),
+              ),
+            ]
+          : []),
         this.check(
           "fresnel",
           "Fresnel",
@@ -201,7 +205,7 @@ export class Controls {
     });
     input.addEventListener("input", () => this.actions.coordinate(number, input.valueAsNumber));
     this.sliders.push({ axis: number, input });
-    this.footer.append(input);
+    this.footer.append(element("label", { class: "axis" }, [element("span", {}, [axis.name]), input]));
   }
 
   show(s: Settings, point: number[], width: number): void {

@@ -11,6 +11,7 @@ from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
 from mirrorbake.commands.options import Exposure, Folder, Threads, ToneMap
 from mirrorbake.commands.progress import messages, progress
+from mirrorbake.errors import OptionError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,8 +93,56 @@ WithReferences = Annotated[
 ]
 
 
+# Of which outputs an option is: given without any of them it would do nothing.
+_OUTPUTS_OF = {
+    "format": ("maps",),
+    "convention": ("maps",),
+    "precision": ("maps",),
+    "sample": ("maps", "glb"),
+    "all_samples": ("maps", "glb"),
+    "fps": ("video",),
+    "frames": ("video", "stills"),
+    "exposure": ("video", "stills"),
+    "tone": ("video", "stills"),
+    "single_file": ("web",),
+    "exact": ("web",),
+    "quality": ("web",),
+    "fallback": ("web",),
+    "references": ("web",),
+    "trim": ("web",),
+}
+
+
+def _check_uses(context: typer.Context) -> None:
+    """Refuse options that what is written has no use for, and names that say something else."""
+    values = context.params
+    if all(values[name] is None for name in ("maps", "glb", "video", "stills", "web")):
+        raise typer.BadParameter("nothing to write: give --maps, --glb, --video, --stills or --web")
+    flags = {parameter.name: parameter.opts[0] for parameter in context.command.params}
+
+    def given(name: str) -> bool:
+        source = context.get_parameter_source(name)
+        return source is not None and source.name == "COMMANDLINE"
+
+    for name, outputs in _OUTPUTS_OF.items():
+        if given(name) and all(values[output] is None for output in outputs):
+            wanted = " or ".join(flags[output] for output in outputs)
+            raise typer.BadParameter(f"{flags[name]} has no use without {wanted}")
+    if values["sample"] is not None and values["all_samples"]:
+        raise typer.BadParameter("--sample and --all exclude each other")
+    if values["exact"] and given("quality"):
+        raise typer.BadParameter("--exact and --quality exclude each other")
+    glb, web, single = values["glb"], values["web"], values["single_file"]
+    if glb is not None and Path(glb).suffix.lower() != ".glb":
+        raise OptionError(f"--glb = {glb}: expected a name that ends in .glb")
+    if web is not None and single != (Path(web).suffix.lower() in (".html", ".htm")):
+        wanted = "a name that ends in .html" if single else "a folder's name, or --single-file with it"
+        raise OptionError(f"--web = {web}: expected {wanted}")
+
+
 @reports_errors
 def export_command(
+    context: typer.Context,
     directory: Folder,
     maps: MapsFolder = None,
     format: MapFormat = "ktx2",
@@ -118,10 +167,7 @@ def export_command(
     threads: Threads = 0,
 ) -> None:
     """Write a PEM for other programs: its maps, a glTF file, a film, pictures, a page that draws it."""
-    if all(out is None for out in (maps, glb, video, stills, web)):
-        raise typer.BadParameter("nothing to write: give --maps, --glb, --video, --stills or --web")
-    if sample is not None and all_samples:
-        raise typer.BadParameter("--sample and --all exclude each other")
+    _check_uses(context)
     with _core.ThreadLimit(threads):
         if maps is not None:
             _export_maps(directory, maps, format, convention, precision, sample, all_samples)

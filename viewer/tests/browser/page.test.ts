@@ -1,3 +1,4 @@
+import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
@@ -292,5 +293,29 @@ test("until the first sample is there the object is drawn from the static map", 
   await page.waitForFunction(() => window.mirrorbake.scene?.cache.ready === 3, undefined, { timeout: 20000 });
   expect(await page.evaluate(() => window.mirrorbake.scene?.cache.share)).toBe(1);
   await context.close();
+  own.server.close();
+});
+
+test("a PEM shows the controls that it has a use for, and names its sliders where there are several", async () => {
+  const own = await serve(join(CASES, "infinite"));
+  const manifest = JSON.parse(readFileSync(join(CASES, "infinite", "manifest.json"), "utf8"));
+  manifest.mesh.arrays.irradiance = undefined;
+  manifest.axes.push({ name: "light", values: [0], low: 0, high: 1, period: null });
+  for (const sample of manifest.samples) sample.parameter.push(0);
+  own.replaced.set("manifest.json", Buffer.from(JSON.stringify(manifest)));
+  const { page, context, errors } = await open(browser, own.url, small);
+  for (const name of ["arc", "light"])
+    expect(await page.locator("footer").getByText(name).isVisible()).toBe(true);
+  await page.locator("#menu").click();
+  expect(await page.getByLabel("Fresnel").count()).toBe(1);
+  expect(await page.getByLabel("diffuse").count()).toBe(0);
+  expect(errors).toEqual([]);
+  await context.close();
+  // One slider alone is told by what it does, and there the body is diffuse.
+  const single = await open(browser, site.url, small);
+  expect(await single.page.locator("footer").getByText("arc").isVisible()).toBe(false);
+  await single.page.locator("#menu").click();
+  expect(await single.page.getByLabel("diffuse").count()).toBe(1);
+  await single.context.close();
   own.server.close();
 });

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
+from mirrorbake.bake.choose_weights import with_chosen_weight
 from mirrorbake.bake.contents import contents_of, with_static_set
 from mirrorbake.bake.estimate import Estimate, estimate
 from mirrorbake.bake.sample import SampleBaker
@@ -120,6 +121,8 @@ def bake(
             report(0, total, "finding out what the scene requires")
             plan = analyze(stage)
             store, contents = None, contents_of(stage.planned(plan), plan, source)
+            decided = with_chosen_weight(stage.planned(plan), plan, contents)
+            contents = replace(contents, header=replace(contents.header, plan=decided))
         plan = contents.header.plan
         stage = stage.planned(plan)
         if on_plan is not None:

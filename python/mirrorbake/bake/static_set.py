@@ -114,12 +114,13 @@ def stripes_of(
     step: int,
     phase: int,
     weight: float = 1.0,
+    rows: int = ROWS,
 ) -> list[FitView]:
     """Return every so-manieth stripe of a view that sees the object."""
     views = []
-    for number in range(phase, -(-camera.height // ROWS), step):
-        y = number * ROWS
-        view = tracer.stripe(stage, camera, (0, y, camera.width, min(ROWS, camera.height - y)))
+    for number in range(phase, -(-camera.height // rows), step):
+        y = number * rows
+        view = tracer.stripe(stage, camera, (0, y, camera.width, min(rows, camera.height - y)))
         if view is not None:
             views.append(FitView(view, weight=weight))
     return views

@@ -260,9 +260,10 @@ class Infer(Section):
     neighbours: Annotated[Annotated[float, Field(ge=0, le=1)] | None, *AUTO] = None
     """Of fit = "display": weight of the neighbouring samples' views in the fit of a sample. "auto": 0.3 where
     they are close, by `auto.quality`."""
-    smoothness: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
+    smoothness: Annotated[Annotated[float, Field(ge=0, le=1e6)] | None, *AUTO] = 3e-4
     """Weight λ of differences between neighbouring texels: small fits the sampled view best, large survives
-    longer away from it."""
+    longer away from it. "auto": by what pixels and a view that are held out say; `level_agreement` and
+    `prior_weight` are for λ = 3e-4 then, and scaled with it."""
     level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
     """Weight λ of a texel's difference from the mean of the four below it in the pyramid."""
     prior: Literal["smooth", "captured"] = "captured"
@@ -356,6 +357,8 @@ class SceneConfig(Section):
                 raise ValueError(
                     f"maps.distant and the proxy of {self.shells[-1].name!r} are one; give either"
                 )
+        if self.infer.smoothness is None and self.infer.fit == "layers":
+            raise ValueError('infer.smoothness = "auto" needs infer.fit = "display"')
         for axis in scene_axes(self).values():
             axis.check(self)
         return self

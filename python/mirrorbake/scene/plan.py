@@ -11,7 +11,7 @@ from mirrorbake.scene.config_shells import Shells, ShellSection
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.config import Infer, SceneConfig
 
 DECIDED_KEYS = (
     "reflector.parts",
@@ -33,8 +33,23 @@ DECIDED_KEYS = (
 """Keys of a scene file that may be "auto", in the order in which they are decided."""
 
 
+USUAL_WEIGHT = 3e-4
+"""λ for which the regulariser's other weights are meant where a plan decides it."""
+
 DecisionValue: TypeAlias = bool | int | float | str | list[dict[str, Any]]
 """Of a key of a scene file; the list of tables of `shells`."""
+
+
+def with_weight(infer: Infer, weight: float) -> Infer:
+    """Return settings with a λ of smoothness in place of "auto", and the other weights scaled alike."""
+    scale = weight / USUAL_WEIGHT
+    return infer.model_copy(
+        update={
+            "smoothness": weight,
+            "level_agreement": scale * infer.level_agreement,
+            "prior_weight": scale * infer.prior_weight,
+        }
+    )
 
 
 @dataclass(frozen=True)
@@ -151,13 +166,17 @@ class Plan:
             values = {name: self.value(f"{section}.{name}") for name in names}
             return getattr(config, section).model_copy(update=values)
 
+        infer = resolved("infer", "passes", "neighbours")
+        weight = next((d.value for d in self.decisions if d.key == "infer.smoothness"), None)
+        if infer.smoothness is None and weight is not None:
+            infer = with_weight(infer, cast("float", weight))
         return config.model_copy(
             update={
                 "reflector": resolved("reflector", "parts"),
                 "maps": resolved("maps", "shared_distant"),
                 "trace": resolved("trace", "samples", "noise", "depth"),
                 "views": resolved("views", "traced"),
-                "infer": resolved("infer", "passes", "neighbours"),
+                "infer": infer,
                 "static": resolved("static", "views"),
                 "shells": self.shell_sections,
             }

@@ -30,10 +30,16 @@ class Command {
 
 using AddCommand = std::unique_ptr<Command> (*)(CLI::App&);
 
+/// Wrong usage is one line, as other errors are.
+inline std::string usage_error(const CLI::App* app, const CLI::Error& error) {
+  return app->get_name() + ": " + error.what() + "; --help explains\n";
+}
+
 /// Parses the arguments of a program, which get --threads and --json, and calls body(json); the exit status.
 template <typename Body>
 int run_parsed(CLI::App& app, const char* json_text, int argc, char** argv, const Body& body) {
   app.set_version_flag("--version", app.get_name() + " " MIRRORBAKE_VERSION);
+  app.failure_message(usage_error);
   int threads = 0;
   bool json = false;
   app.add_option("--threads", threads, "threads to use, 0 for all; no result depends on it")

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "command.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -20,7 +21,6 @@
 #include "mirrorbake/shading/fresnel.hpp"
 #include "mirrorbake/shading/fresnel_table.hpp"
 #include "mirrorbake/shading/metals.hpp"
-#include "tool.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -331,6 +331,7 @@ int run(int argc, char** argv) {
   CLI::App app("Fresnel curves, plots, tables and the report of what each approximation costs.",
                "mb-fresnel");
   app.set_version_flag("--version", "mb-fresnel " MIRRORBAKE_VERSION);
+  app.failure_message(tool::usage_error);
   app.add_option("--threads", options.threads, "Threads, 0 for all cores")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));

@@ -272,7 +272,7 @@ def run(command: str, folder: Path) -> Outcome:
     return Outcome(done.returncode, done.stdout, done.stderr)
 
 
-def assert_fails(command: str, folder: Path, status: int) -> None:
+def assert_fails(command: str, folder: Path, status: int) -> Outcome:
     before = sorted(folder.iterdir())
     result = run(command, folder)
     assert result.status == status, (command, result.stderr)
@@ -280,6 +280,7 @@ def assert_fails(command: str, folder: Path, status: int) -> None:
     assert result.stderr.strip(), command
     assert "Traceback" not in result.stderr, command
     assert sorted(folder.iterdir()) == before, command
+    return result
 
 
 @pytest.mark.parametrize(
@@ -289,7 +290,7 @@ def test_a_value_that_an_option_does_not_take_is_exit_2(command: str, option: st
     # The last word on an option counts, and --direction would only get a second one.
     name = option.split()[0]
     kept = re.sub(rf" {name}( (?!-)\S+)+", "", command)
-    assert_fails(f"{kept} {option}", folder, 2)
+    assert len(assert_fails(f"{kept} {option}", folder, 2).stderr.splitlines()) == 1
 
 
 @pytest.mark.parametrize("command", FILES)
@@ -300,4 +301,4 @@ def test_a_file_that_cannot_be_used_is_exit_3(command: str, folder: Path) -> Non
 @pytest.mark.parametrize("program", ["mb-trace", "mb-envmap", "mb-fresnel", "mb-infer", "mirrorbake"])
 @pytest.mark.parametrize("words", ["fly", "--fly"])
 def test_an_unknown_command_is_exit_2(program: str, words: str, folder: Path) -> None:
-    assert_fails(f"{program} {words}", folder, 2)
+    assert len(assert_fails(f"{program} {words}", folder, 2).stderr.splitlines()) == 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import os
 import shutil
 import signal
@@ -17,6 +18,7 @@ import pytest
 
 from mirrorbake import _core
 from mirrorbake.bake.bake import bake
+from mirrorbake.bake.fade import fit_fade, held_out
 from mirrorbake.bake.static_set import static_places
 from mirrorbake.errors import InputError, OptionError, StoreError
 from mirrorbake.evaluate.metrics import psnr
@@ -31,12 +33,16 @@ from mirrorbake.pem.verify import verify
 from mirrorbake.pem.view_images import images_of_trace
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import prepare_stage
+from mirrorbake.tone import srgb_encoded
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from mirrorbake.bake.estimate import Estimate
+    from mirrorbake.bake.sample import SampleBaker
+    from mirrorbake.pem.store import Contents
     from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.stage import Stage
 
 # Small enough for a second a sample.
 TINY: dict[str, Any] = {
@@ -403,3 +409,30 @@ def test_a_third_of_the_views_of_a_static_set_lie_around_the_samples(tmp_path: P
     # Alone it is inferred from all of its directions alike.
     alone = scene(tmp_path, {"kind": "none", "count": 6, "elevation": [0.0, 60.0]})
     assert [weight for _, weight in static_places(prepare_stage(alone))] == [1.0] * 6
+
+
+def test_how_far_a_sample_holds_is_found_in_its_own_scene_with_its_own_light(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[float] = []
+
+    def watched(stage: Stage, contents: Contents, baker: SampleBaker) -> float:
+        for away, mine, _, truth in held_out(stage, contents, baker.bake(1), 1):
+            if away < 4.0:
+                shown = srgb_encoded(mine)
+                found.append(-10.0 * math.log10(float(np.mean((shown - truth) ** 2))))
+        return fit_fade(stage, contents, baker)
+
+    monkeypatch.setattr("mirrorbake.bake.contents.fit_fade", watched)
+    # Most of the light is the body's, and at the sample the object has turned by a right angle.
+    config = scene(
+        tmp_path,
+        {"kind": "fixed", "start": 20},
+        motion={"to": [0.05, 0.0, 0.0], "turn": 90.0, "count": 2},
+        material={"fresnel": "schlick", "r0": 0.1, "albedo": 0.7},
+        static={"views": 3},
+    )
+    bake(config, tmp_path / "pem")
+    # Without its diffuse light there are 8 dB.
+    assert found
+    assert min(found) > 17.0

@@ -11,7 +11,7 @@ from mirrorbake import _core
 from mirrorbake.bake.static_set import stripes_of
 from mirrorbake.bake.targets import ViewTracer
 from mirrorbake.pem.run_time import diffuse_of, fade_weight, model_of, shell_maps
-from mirrorbake.scene.pose import AT_REST
+from mirrorbake.scene.config_axes import arranged
 from mirrorbake.tone import srgb_encoded
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
-    from mirrorbake.bake.sample import SampleBaker
+    from mirrorbake.bake.sample import BakedSample, SampleBaker
     from mirrorbake.pem.store import Contents
     from mirrorbake.scene.stage import Stage
 
@@ -48,15 +48,13 @@ def fit_fade(stage: Stage, contents: Contents, baker: SampleBaker) -> float:
     baker
         Of the samples.
     """
-    header, cameras = contents.header, stage.built.cameras
     assert contents.static_maps is not None
-    space = header.space
+    space = contents.header.space
     places = [
         len(axis.values) - 1 if axis.name == "elevation" else len(axis.values) // 2 for axis in space.axes
     ]
     index = int(np.ravel_multi_index(places, space.shape)) if space.axes else 0
-    maps = baker.bake(index).maps
-    pairs = list(_held_out(stage, contents, maps, cameras.angles_of(cameras.eye(space.sample(index)))))
+    pairs = list(held_out(stage, contents, baker.bake(index), index))
     if not pairs:
         return float(CANDIDATES[-1])
 
@@ -72,14 +70,25 @@ def fit_fade(stage: Stage, contents: Contents, baker: SampleBaker) -> float:
     return best
 
 
-def _held_out(
-    stage: Stage, contents: Contents, maps: dict[tuple[str, str], FloatArray], place: tuple[float, float]
+def held_out(
+    stage: Stage, contents: Contents, baked: BakedSample, index: int
 ) -> Iterator[tuple[float, FloatArray, FloatArray, NDArray[np.float64]]]:
-    """Yield degrees beyond, the pixels of a sample and of the static set, and true displayed ones."""
-    header, cameras = contents.header, stage.built.cameras
-    tracer, model, pose = ViewTracer(stage, header), model_of(header.run_time), AT_REST
-    static_maps = contents.static_maps
+    """Draw views beyond a sample in the sample's own scene.
+
+    Yields the degrees beyond, pixels (n, 3) from the sample's maps and from the static set, and the true ones
+    as a display shows them.
+    """
+    header = contents.header
+    point = header.space.sample(index)
+    here = stage.at(point)
+    pose = arranged(stage.config, header.space.scene_coordinates(point)).pose
+    cameras = here.built.cameras
+    place = cameras.angles_of(cameras.eye(point))
+    tracer, model = ViewTracer(stage, header), model_of(header.run_time)
+    static_maps, maps, irradiance = contents.static_maps, baked.maps, baked.irradiance
     assert static_maps is not None
+    if irradiance is None and contents.irradiance is not None:
+        irradiance = contents.irradiance[0]
 
     def static(part: str, shell: str) -> FloatArray:
         number = header.map_of(part, shell)
@@ -98,11 +107,11 @@ def _held_out(
         if away == 0.0:
             continue
         pixels: list[tuple[FloatArray, ...]] = []
-        for stripe in stripes_of(tracer, stage, camera, STRIPES, number % STRIPES):
+        for stripe in stripes_of(tracer, here, camera, STRIPES, number % STRIPES):
             lookups, images = stripe.view.lookups, stripe.view.images
             diffuse = None
-            if contents.irradiance is not None:
-                diffuse = diffuse_of(lookups, stage.built.triangles, contents.irradiance[0])
+            if irradiance is not None:
+                diffuse = diffuse_of(lookups, here.built.triangles, irradiance)
             drawn = [np.asarray(_core.render_reflector(lookups, parts, diffuse, model)) for parts in sets]
             seen = (images.coverage > 0.99) & (drawn[0][..., 3] > 0.99)
             pixels.append((drawn[0][seen][:, :3], drawn[1][seen][:, :3], images.object[seen]))

@@ -156,7 +156,8 @@ def export_source(pem: OpenedPem) -> ExportSource:
         maps=tuple(MapEntry(entry.name, header.map_size, entry.channels == 3) for entry in header.maps),
         pyramid=pyramid,
         static_maps=static_maps,
-        reads=partial(texels_read, pem),
+        # The one sample of a PEM without parameters is drawn from everywhere.
+        reads=None if header.is_static_set else partial(texels_read, pem),
         fade_degrees=None if fade is None or static_maps is None else fade["degrees"],
         still=lambda sample: store.read_images(sample).beauty,
         mesh=ReflectorMesh(

@@ -9,7 +9,9 @@ failure. Packages are fetched by npm and pip, and kept in build/public-files.
 from __future__ import annotations
 
 import argparse
+import base64
 import multiprocessing
+import re
 import resource
 import subprocess
 import sys
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 FOLDER = Path(__file__).parents[1] / "build" / "public-files"
 
 # Packages that ship models or images, in versions that do not change.
-NPM = ("@webxr-input-profiles/assets@1.0.20",)
+NPM = ("@webxr-input-profiles/assets@1.0.20", "@pmndrs/assets@1.7.0")
 PYPI = ("genesis-world==1.4.5", "pybullet==3.2.7", "ursina==7.0.0")
 
 SCENES = (".gltf", ".glb", ".obj")
@@ -61,7 +63,18 @@ def fetch() -> list[Path]:
             with tarfile.open(archive) as tar:
                 tar.extractall(folder, filter="data")
         archive.unlink()
+        unpack_modules(folder)
     return folders
+
+
+def unpack_modules(folder: Path) -> None:
+    """Write the files that modules NAME.SUFFIX.js hold as text, beside them."""
+    for module in folder.rglob("*.*.js"):
+        if module.with_suffix("").suffix not in (*SCENES, *IMAGES):
+            continue
+        found = re.search(r"data:[^;,\"']*;base64,([A-Za-z0-9+/=]+)", module.read_text(encoding="utf-8"))
+        if found:
+            module.with_suffix("").write_bytes(base64.b64decode(found[1]))
 
 
 def serve(connection: Connection) -> None:

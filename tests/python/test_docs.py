@@ -92,9 +92,11 @@ def workplace(tmp_path: Path, small_pem: Path, monkeypatch: pytest.MonkeyPatch) 
     kitchen.nodes = [
         {"name": name, "mesh": square, "translation": [0, y, 0]} for y, name in enumerate(["floor", "kettle"])
     ]
-    kitchen.write(tmp_path / "kitchen.glb")
+    for name in ("kitchen.glb", "bottle.glb"):
+        kitchen.write(tmp_path / name)
     (tmp_path / "scene.toml").write_text(TINY_TOML.replace("count = 2", "count = 100"))
-    shutil.copytree(small_pem, tmp_path / "out" / "teapot")
+    for name in ("teapot", "bottle"):
+        shutil.copytree(small_pem, tmp_path / "out" / name)
     (tmp_path / "examples").mkdir()
     for scene in (ROOT / "examples").glob("*.toml"):
         shutil.copy(scene, tmp_path / "examples")

@@ -62,6 +62,36 @@ describe("controls", () => {
     expect((await settings(page)).azimuth).not.toBe(before.azimuth);
   });
 
+  test("two fingers zoom, and a finger drags the divider", async () => {
+    const { page } = opened;
+    const client = await opened.context.newCDPSession(page);
+    const touch = (type: "touchStart" | "touchMove" | "touchEnd", points: [number, number][]) =>
+      client.send("Input.dispatchTouchEvent", {
+        type,
+        touchPoints: points.map(([x, y], id) => ({ x, y, id })),
+      });
+    const { distance } = await settings(page);
+    await touch("touchStart", [
+      [140, 200],
+      [180, 200],
+    ]);
+    await touch("touchMove", [
+      [110, 200],
+      [210, 200],
+    ]);
+    await touch("touchEnd", []);
+    expect((await settings(page)).distance).toBeLessThan(0.8 * distance);
+    await page.evaluate(() => window.mirrorbake.change({ compare: "static", divider: 0.5 }));
+    await settle(page);
+    await touch("touchStart", [[0.5 * small.width, 210]]);
+    await touch("touchMove", [[0.3 * small.width, 210]]);
+    await touch("touchEnd", []);
+    expect((await settings(page)).divider).toBeCloseTo(0.3, 1);
+    await page.evaluate(() => window.mirrorbake.change({ compare: "off" }));
+    await page.keyboard.press("Home");
+    await settle(page);
+  });
+
   test("keys turn, zoom, step, play and reset", async () => {
     const { page } = opened;
     await page.locator("canvas").focus();
@@ -128,6 +158,51 @@ describe("controls", () => {
     expect((await download).suggestedFilename()).toBe("box.png");
     await page.locator("#menu").click();
     expect(await page.locator("#panel").isVisible()).toBe(false);
+  }, 180000);
+
+  test("every switch, choice and button works by a tap and by keys", async () => {
+    const { page } = opened;
+    // Chromium draws in software: tests do not wait for pictures here, only for what they are told.
+    await page.locator("#menu").tap();
+    expect(await page.locator("#panel").isVisible()).toBe(true);
+    for (const id of ["shell-0", "shell-1", "diffuse", "fresnel", "blended", "lookups", "stereo"]) {
+      const input = page.locator(`#${id}`);
+      const before = await input.isChecked();
+      await input.tap({ force: true });
+      expect(await input.isChecked(), `${id} by a tap`).toBe(!before);
+      await input.focus();
+      await page.keyboard.press("Space");
+      expect(await input.isChecked(), `${id} by a key`).toBe(before);
+    }
+    for (const id of ["toneMapping", "background", "theme"]) {
+      const select = page.locator(`#${id}`);
+      const before = await select.inputValue();
+      const isFirst = await select.evaluate((node) => (node as HTMLSelectElement).selectedIndex === 0);
+      await select.focus();
+      await page.keyboard.press(isFirst ? "ArrowDown" : "ArrowUp");
+      expect(await select.inputValue(), id).not.toBe(before);
+      await select.selectOption(before);
+    }
+    await page.locator("#exposure").focus();
+    await page.keyboard.press("ArrowRight");
+    expect((await settings(page)).exposure).toBeCloseTo(0.1, 5);
+    const { azimuth } = await settings(page);
+    await page.locator("#axis-arc").focus();
+    await page.keyboard.press("ArrowRight");
+    expect((await settings(page)).azimuth).toBeGreaterThan(azimuth);
+    await page.locator("#reset").focus();
+    await page.keyboard.press("Enter");
+    expect((await settings(page)).exposure).toBe(0);
+    await page.locator("#menu").focus();
+    await page.keyboard.press("Enter");
+    expect(await page.locator("#panel").isVisible()).toBe(false);
+    const play = page.locator("#play");
+    await play.tap();
+    expect(await play.textContent()).toBe("Pause");
+    await play.focus();
+    await page.keyboard.press("Enter");
+    expect(await play.textContent()).toBe("Play");
+    await settle(page);
   }, 180000);
 
   test("the divider compares with a static map, and moves by mouse and keys", async () => {

@@ -39,24 +39,58 @@ glm::mat3 axes_matrix(const std::optional<Axes>& axes) {
   return matrix;
 }
 
-const char* kind_name(const Proxy& proxy) {
-  constexpr const char* kNames[] = {"infinite", "box", "ellipsoid", "hemisphere"};
-  return kNames[proxy.shape.index()];
+[[noreturn]] void throw_missing(const Proxy& proxy, const char* field) {
+  // AttributeError, so that hasattr() tells.
+  const std::string text = std::string("a proxy of kind '") + shape_name(proxy) + "' has no " + field;
+  throw nb::attribute_error(text.c_str());
 }
 
-/// `get` of the shape, if it is one that `get` accepts; AttributeError otherwise, so that hasattr() tells.
-template <typename Field, typename Get>
-Field shape_field(const Proxy& proxy, const char* field, Get get) {
+/// A member that all shapes but the infinite one have.
+template <typename Get>
+auto placed_field(const Proxy& proxy, const char* field, Get get) {
+  using Value = decltype(get(Box{}));
   return std::visit(
-      [&](const auto& shape) -> Field {
-        if constexpr (std::is_invocable_v<Get, decltype(shape)>) {
-          return get(shape);
-        } else {
-          const std::string text = std::string("a proxy of kind '") + kind_name(proxy) + "' has no " + field;
-          throw nb::attribute_error(text.c_str());
-        }
+      [&]<typename Shape>(const Shape& shape) -> Value {
+        if constexpr (PlacedShape<Shape>) return get(shape);
+        throw_missing(proxy, field);
       },
       proxy.shape);
+}
+
+template <typename Value>
+Value extent_field(const Proxy& proxy, std::string_view name) {
+  std::optional<Value> found;
+  std::visit(
+      [&]<typename Shape>(const Shape& shape) {
+        const auto look_at = [&]<typename Own>(const ShapeExtent<Shape, Own>& extent) {
+          if constexpr (std::is_same_v<Own, Value>) {
+            if (name == extent.name) found = shape.*(extent.member);
+          }
+        };
+        std::apply([&](const auto&... extent) { (look_at(extent), ...); }, ShapeTraits<Shape>::extents);
+      },
+      proxy.shape);
+  if (!found) throw_missing(proxy, std::string(name).c_str());
+  return *found;
+}
+
+/// What tells a shape besides the map's origin.
+template <typename Shape>
+std::vector<std::string> fields_of() {
+  if constexpr (!PlacedShape<Shape>) return {};
+  std::vector<std::string> names = {"centre"};
+  std::apply([&](const auto&... extent) { (names.emplace_back(extent.name), ...); },
+             ShapeTraits<Shape>::extents);
+  names.emplace_back("axes");
+  return names;
+}
+
+/// Calls function.operator()<Shape>() for every shape.
+template <typename Function>
+void for_each_shape(const Function& function) {
+  [&]<typename... Shape>(const std::variant<Shape...>&) {
+    (function.template operator()<Shape>(), ...);
+  }(Proxy{}.shape);
 }
 
 template <typename Real>
@@ -130,79 +164,61 @@ nb::ndarray<nb::numpy, float> mirror_lookups_of_layers(const std::vector<Proxy>&
                      [&](auto p, auto n, auto lookups) { mirror_lookups(proxies, eye, p, n, lookups); });
 }
 
-/// What a proxy consists of, for pickles: kind, origin, centre, size (a radius thrice) and axes.
+/// What a proxy consists of, for pickles: kind, origin, centre, extents and axes.
 nb::tuple proxy_state(const Proxy& proxy) {
-  const auto state = [&](glm::vec3 centre, glm::vec3 size, const glm::mat3& proxy_from_world) {
-    return nb::make_tuple(kind_name(proxy), proxy.origin, centre, size,
-                          std::vector<float>(&proxy_from_world[0][0], &proxy_from_world[0][0] + 9));
-  };
-  if (const auto* box = std::get_if<Box>(&proxy.shape)) {
-    return state(box->centre, box->half_extent, box->proxy_from_world);
-  }
-  if (const auto* ellipsoid = std::get_if<Ellipsoid>(&proxy.shape)) {
-    return state(ellipsoid->centre, ellipsoid->radii, ellipsoid->proxy_from_world);
-  }
-  if (const auto* hemisphere = std::get_if<Hemisphere>(&proxy.shape)) {
-    return state(hemisphere->centre, glm::vec3(hemisphere->radius), hemisphere->proxy_from_world);
-  }
-  return state(glm::vec3(0.0F), glm::vec3(0.0F), glm::mat3(1.0F));
+  glm::vec3 centre(0.0F);
+  glm::mat3 axes(1.0F);
+  std::visit(
+      [&]<typename Shape>(const Shape& shape) {
+        if constexpr (PlacedShape<Shape>) {
+          centre = shape.centre;
+          axes = shape.proxy_from_world;
+        }
+      },
+      proxy.shape);
+  return nb::make_tuple(shape_name(proxy), proxy.origin, centre, extents_of(proxy),
+                        std::vector<float>(&axes[0][0], &axes[0][0] + 9));
 }
 
-Proxy proxy_from_state(const std::string& kind, glm::vec3 origin, glm::vec3 centre, glm::vec3 size,
-                       const std::vector<float>& proxy_from_world) {
+Proxy proxy_from_state(const std::string& kind, glm::vec3 origin, glm::vec3 centre,
+                       const std::vector<float>& extents, const std::vector<float>& proxy_from_world) {
   if (proxy_from_world.size() != 9) throw InvalidArgument("state", "of other axes", "9 numbers");
   glm::mat3 matrix;
   std::copy(proxy_from_world.begin(), proxy_from_world.end(), &matrix[0][0]);
-  if (kind == "box") return make_proxy(Box{centre, size, matrix}, origin);
-  if (kind == "ellipsoid") return make_proxy(Ellipsoid{centre, size, matrix}, origin);
-  if (kind == "hemisphere") return make_proxy(Hemisphere{centre, size.x, matrix}, origin);
-  return make_proxy(InfiniteSphere{}, origin);
+  std::optional<Proxy> proxy = proxy_from_numbers(kind, centre, extents, matrix);
+  if (!proxy) throw InvalidArgument("state", "of kind " + kind, "what __getstate__ returned");
+  proxy->origin = origin;
+  validate(*proxy);
+  return *proxy;
 }
 
 void bind_attributes(nb::class_<Proxy>& proxy) {
-  proxy.def_prop_ro("kind", &kind_name, "'infinite', 'box', 'ellipsoid' or 'hemisphere'.")
+  proxy.def_prop_ro("kind", &shape_name, "Name of the shape, which is that of its constructor.")
       .def_ro("origin", &Proxy::origin, "Origin of the map: lookups are directions seen from here.")
       .def_prop_ro(
           "centre",
           [](const Proxy& p) {
-            return shape_field<glm::vec3>(
-                p, "centre", [](const auto& s) -> std::decay_t<decltype(s.centre)> { return s.centre; });
+            return placed_field(p, "centre", [](const auto& shape) { return shape.centre; });
           },
           "Centre of the shape (of its floor, for the hemisphere). AttributeError if it is infinite.")
       .def_prop_ro(
-          "half_extent",
-          [](const Proxy& p) {
-            return shape_field<glm::vec3>(
-                p, "half_extent",
-                [](const auto& s) -> std::decay_t<decltype(s.half_extent)> { return s.half_extent; });
-          },
-          "Half the box's edge lengths, along its axes. AttributeError for other kinds.")
-      .def_prop_ro(
-          "radii",
-          [](const Proxy& p) {
-            return shape_field<glm::vec3>(
-                p, "radii", [](const auto& s) -> std::decay_t<decltype(s.radii)> { return s.radii; });
-          },
-          "Radii of the ellipsoid along its axes. AttributeError for other kinds.")
-      .def_prop_ro(
-          "radius",
-          [](const Proxy& p) {
-            return shape_field<float>(
-                p, "radius", [](const auto& s) -> std::decay_t<decltype(s.radius)> { return s.radius; });
-          },
-          "Radius of the hemisphere. AttributeError for other kinds.")
-      .def_prop_ro(
           "axes",
           [](const Proxy& p) {
-            const glm::mat3 columns = shape_field<glm::mat3>(
-                p, "axes", [](const auto& s) -> std::decay_t<decltype(s.proxy_from_world)> {
-                  return s.proxy_from_world;
-                });
-            const glm::mat3 rows = glm::transpose(columns);
+            const glm::mat3 rows = glm::transpose(
+                placed_field(p, "axes", [](const auto& shape) { return shape.proxy_from_world; }));
             return to_numpy(std::vector<float>(&rows[0][0], &rows[0][0] + 9), {3, 3});
           },
           nb::rv_policy::move,
           "The shape's own axes in world space, one per row. AttributeError if it is infinite.");
+  for_each_shape([&]<typename Shape>() {
+    const auto bind = [&]<typename Value>(const ShapeExtent<Shape, Value>& extent) {
+      const std::string doc = std::string(extent.meaning) + " AttributeError for other kinds.";
+      proxy.def_prop_ro(
+          extent.name, [name = extent.name](const Proxy& p) { return extent_field<Value>(p, name); },
+          doc.c_str());
+    };
+    std::apply([&](const auto&... extent) { (bind(extent), ...); }, ShapeTraits<Shape>::extents);
+  });
 }
 
 void bind_lookups(nb::class_<Proxy>& proxy) {
@@ -255,14 +271,40 @@ InvalidArgument
       .def("validate", &validate, "Raises InvalidArgument, naming the field, if the proxy is not usable.")
       .def("__repr__", [](const Proxy& p) {
         const nb::object self = nb::cast(p);
-        std::string text = std::string("Proxy(kind='") + kind_name(p) + "'";
-        for (const char* field : {"centre", "half_extent", "radii", "radius", "origin"}) {
-          if (nb::hasattr(self, field)) {
-            text += std::string(", ") + field + "=" + nb::cast<std::string>(nb::repr(self.attr(field)));
-          }
+        std::string text = std::string("Proxy(kind='") + shape_name(p) + "'";
+        std::vector<std::string> fields =
+            std::visit([]<typename Shape>(const Shape&) { return fields_of<Shape>(); }, p.shape);
+        std::replace(fields.begin(), fields.end(), std::string("axes"), std::string("origin"));
+        if (fields.empty()) fields = {"origin"};
+        for (const std::string& field : fields) {
+          text += ", " + field + "=" + nb::cast<std::string>(nb::repr(self.attr(field.c_str())));
         }
         return text + ")";
       });
+}
+
+template <typename Shape, std::size_t i>
+using ExtentValue = std::decay_t<decltype(Shape{}.*(std::get<i>(ShapeTraits<Shape>::extents).member))>;
+
+template <typename Shape, std::size_t... i>
+void bind_shape(nb::class_<Proxy>& proxy, std::index_sequence<i...>) {
+  using Traits = ShapeTraits<Shape>;
+  const std::string doc = std::string(Traits::meaning) +
+                          " `origin` has to lie inside; by default it is the centre, or above the floor. "
+                          "Raises InvalidArgument for unusable values.";
+  proxy.def_static(
+      Traits::name,
+      [](glm::vec3 centre, ExtentValue<Shape, i>... extents, std::optional<glm::vec3> origin,
+         std::optional<Axes> axes) {
+        Shape shape;
+        shape.centre = centre;
+        shape.proxy_from_world = axes_matrix(axes);
+        ((shape.*(std::get<i>(Traits::extents).member) = extents), ...);
+        const glm::vec3 inside = centre + glm::transpose(shape.proxy_from_world) * Traits::inside(shape);
+        return make_proxy(shape, origin.value_or(inside));
+      },
+      nb::arg("centre"), nb::arg(std::get<i>(Traits::extents).name)..., nb::arg("origin") = nb::none(),
+      nb::arg("axes") = nb::none(), doc.c_str());
 }
 
 void bind_shapes(nb::module_& m) {
@@ -276,40 +318,32 @@ array whose rows are the shape's own axes in world space (default: aligned with 
           "infinite", [](glm::vec3 origin) { return make_proxy(InfiniteSphere{}, origin); },
           nb::arg("origin") = glm::vec3(0.0F), "The classic environment map: only the direction counts.")
       .def_static(
-          "box",
-          [](glm::vec3 centre, glm::vec3 half_extent, std::optional<glm::vec3> origin,
-             std::optional<Axes> axes) {
-            return make_proxy(Box{centre, half_extent, axes_matrix(axes)}, origin.value_or(centre));
-          },
-          nb::arg("centre"), nb::arg("half_extent"), nb::arg("origin") = nb::none(),
-          nb::arg("axes") = nb::none(),
-          R"(A box. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for
-unusable values.)")
-      .def_static(
-          "ellipsoid",
-          [](glm::vec3 centre, glm::vec3 radii, std::optional<glm::vec3> origin, std::optional<Axes> axes) {
-            return make_proxy(Ellipsoid{centre, radii, axes_matrix(axes)}, origin.value_or(centre));
-          },
-          nb::arg("centre"), nb::arg("radii"), nb::arg("origin") = nb::none(), nb::arg("axes") = nb::none(),
-          R"(An ellipsoid. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument
-for unusable values.)")
-      .def_static(
           "sphere",
           [](glm::vec3 centre, float radius, std::optional<glm::vec3> origin) {
             return make_proxy(Ellipsoid{centre, glm::vec3(radius)}, origin.value_or(centre));
           },
           nb::arg("centre"), nb::arg("radius"), nb::arg("origin") = nb::none(),
-          "A finite sphere: an ellipsoid with three equal radii.")
-      .def_static(
-          "hemisphere",
-          [](glm::vec3 centre, float radius, glm::vec3 origin, std::optional<Axes> axes) {
-            return make_proxy(Hemisphere{centre, radius, axes_matrix(axes)}, origin);
-          },
-          nb::arg("centre"), nb::arg("radius"), nb::arg("origin"), nb::arg("axes") = nb::none(),
-          R"(The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie
-inside, above the floor.)");
+          "A finite sphere: an ellipsoid with three equal radii.");
+  for_each_shape([&]<typename Shape>() {
+    if constexpr (PlacedShape<Shape>) {
+      constexpr std::size_t count = std::tuple_size_v<std::decay_t<decltype(ShapeTraits<Shape>::extents)>>;
+      bind_shape<Shape>(proxy, std::make_index_sequence<count>());
+    }
+  });
   bind_attributes(proxy);
   bind_lookups(proxy);
+  m.def(
+      "proxy_shapes",
+      [] {
+        nb::dict shapes;
+        for_each_shape([&]<typename Shape>() {
+          shapes[ShapeTraits<Shape>::name] = nb::tuple(nb::cast(fields_of<Shape>()));
+        });
+        return shapes;
+      },
+      nb::sig("def proxy_shapes() -> dict[str, tuple[str, ...]]"),
+      R"(What tells a shape besides the map's origin, by the name of the shape: attributes of a Proxy, and
+arguments of the constructor that bears the name.)");
 }
 
 void bind_mirror_lookups(nb::module_& m) {

@@ -58,7 +58,7 @@ struct Input {
   EnvMap read() const {
     std::optional<Projection> given;
     if (!projection.empty()) given = parse_projection(projection);
-    EnvMap map = load_envmap(path, given, parse_face_layout(layout), {}, choice);
+    EnvMap map = load_envmap(path, given, parse_name<FaceLayout>(layout, "layout"), {}, choice);
     const std::size_t filled = repairs ? repair_not_finite(path, map) : 0;
     if (filled > 0) {
       std::cerr << "mb-envmap: " << path << ": " << filled << " values were NaN or infinite and are filled\n";
@@ -83,10 +83,12 @@ struct Output {
   }
   // Before the work.
   void check(const Projection& projection) const {
-    check_envmap_path(path, projection, parse_face_layout(layout), parse_pixel_format(format));
+    check_envmap_path(path, projection, parse_name<FaceLayout>(layout, "layout"),
+                      parse_name<PixelFormat>(format));
   }
   void save(const EnvMapView& map, bool json) const {
-    const SaveReport report = save_envmap(path, map, parse_face_layout(layout), parse_pixel_format(format));
+    const SaveReport report =
+        save_envmap(path, map, parse_name<FaceLayout>(layout, "layout"), parse_name<PixelFormat>(format));
     warn_of_losses("mb-envmap", path, report);
     if (!json) return;
     std::cout << "{\"output\": " << json_string(path)

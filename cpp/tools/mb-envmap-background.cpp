@@ -61,9 +61,9 @@ class Background final : public Command {
   }
 
   void run(bool json) const override {
-    const Lens lens = lens_ == "fisheye" ? Lens::fisheye : Lens::perspective;
+    const Lens lens = parse_name<Lens>(lens_);
     const Size size = parse_size(size_, {ProjectionKind::cube});
-    const PixelFormat format = parse_pixel_format(format_);
+    const PixelFormat format = parse_name<PixelFormat>(format_);
     check_image_path(path_, format);
     const std::vector<glm::dvec3> directions = lens_directions(
         lens, size.width, size.height, field_of_view_.value_or(lens == Lens::fisheye ? 180.0 : 45.0));

@@ -53,7 +53,7 @@ struct Conversion {
     const Size wanted = !size.empty()        ? parse_size(size, target)
                         : projection.empty() ? Size{source.layout.width, source.layout.height}
                                              : Size{natural * natural_aspect(target), natural};
-    ResampleOptions options{parse_resample_filter(filter)};
+    ResampleOptions options{parse_name<ResampleFilter>(filter)};
     options.source_from_target = rotation();
     const bool same = target == source.layout.projection && wanted.width == source.layout.width &&
                       wanted.height == source.layout.height && turn == 0.0F;

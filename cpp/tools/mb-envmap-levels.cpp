@@ -63,10 +63,12 @@ class Mips final : public Command {
     input_.add_options(*app);
     input_.add_details(*app);
     output_.add_options(*app);
-    app->add_option("--filter", filter_, "box, solid_angle or seamless")->capture_default_str();
+    app->add_option("--filter", filter_, listed_names<MipFilter>())->capture_default_str();
   }
 
-  void run(bool json) const override { write_mips(input_.load(), parse_mip_filter(filter_), output_, json); }
+  void run(bool json) const override {
+    write_mips(input_.load(), parse_name<MipFilter>(filter_), output_, json);
+  }
 
  private:
   Input input_;

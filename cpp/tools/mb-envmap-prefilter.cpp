@@ -113,7 +113,7 @@ class Prefilter final : public Command {
          app->add_option("--table-angle", table_angle_, "table: degrees of the last weight, up to 180")
              ->capture_default_str());
     only("sh", app->add_option("--order", order_, "sh: highest band, 0 to 8")->capture_default_str());
-    only("sh", app->add_option("--window", window_, "sh, against ringing: none, hanning or sloan")
+    only("sh", app->add_option("--window", window_, "sh, against ringing: " + listed_names<HarmonicWindow>())
                    ->capture_default_str());
     only("sh", app->add_flag("--keep-negative", keep_negative_, "sh: keep irradiance below 0 in images"));
     only("sh",
@@ -246,7 +246,7 @@ class Prefilter final : public Command {
 
   void run_harmonics(bool json) const {
     const bool as_json = has_extension(output_.path, ".json");
-    const HarmonicWindow window = parse_harmonic_window(window_);
+    const HarmonicWindow window = parse_name<HarmonicWindow>(window_);
     const PrefilterTarget target = target_of();
     if (!as_json) output_.check(coefficients_ ? Projection{ProjectionKind::latlong} : target.projection);
     const EnvMap source = load();

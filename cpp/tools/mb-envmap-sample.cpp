@@ -82,7 +82,7 @@ class Sample final : public Command {
   }
 
   void run(bool json) const override {
-    print_samples(input_.load(), directions_, parse_sample_filter(filter_), footprint_, json);
+    print_samples(input_.load(), directions_, parse_name<SampleFilter>(filter_), footprint_, json);
   }
 
  private:

@@ -40,13 +40,11 @@ struct Options {
   int threads = 0;
 };
 
-Illuminant parse_illuminant(const std::string& name) { return name == "E" ? Illuminant::e : Illuminant::d65; }
-
 /// The curves asked for: one channel, or R, G, B for a metal.
 std::vector<ReflectanceFunction> curves_of(const Options& options) {
   if (options.model == "metal") {
     const Metal metal = parse_metal(options.metal);
-    const Illuminant illuminant = parse_illuminant(options.illuminant);
+    const Illuminant illuminant = parse_name<Illuminant>(options.illuminant);
     std::vector<ReflectanceFunction> channels;
     for (int channel = 0; channel < 3; ++channel) {
       channels.emplace_back(
@@ -55,9 +53,7 @@ std::vector<ReflectanceFunction> curves_of(const Options& options) {
     return channels;
   }
   Fresnel fresnel;
-  fresnel.model = options.model == "schlick"     ? FresnelModel::schlick
-                  : options.model == "conductor" ? FresnelModel::conductor
-                                                 : FresnelModel::dielectric;
+  fresnel.model = parse_name<FresnelModel>(options.model);
   fresnel.r0 = glm::vec3(static_cast<float>(options.r0));
   fresnel.eta = glm::vec3(static_cast<float>(options.model == "conductor" ? options.eta : options.ior));
   fresnel.k = glm::vec3(static_cast<float>(options.k));
@@ -186,7 +182,7 @@ void write_plot(const Options& options) {
 
 void print_metal(const Options& options) {
   const Metal metal = parse_metal(options.metal);
-  const Illuminant illuminant = parse_illuminant(options.illuminant);
+  const Illuminant illuminant = parse_name<Illuminant>(options.illuminant);
   const glm::dvec3 normal = metal_reflectance(metal, 1.0, illuminant);
   const MetalFit fit = fit_metal(metal, illuminant);
   const std::string name(to_string(metal));

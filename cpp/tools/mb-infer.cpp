@@ -5,6 +5,7 @@
 #include <charconv>
 #include <iostream>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -39,21 +40,14 @@ std::optional<std::vector<float>> parse_floats(std::string_view text) {
 }
 
 // `numbers`: the shape's, its centre first.
-std::optional<Proxy> proxy_of(std::string_view shape, const std::vector<float>& numbers) {
-  const auto vector = [&](std::size_t first) {
-    return glm::vec3(numbers[first], numbers[first + 1], numbers[first + 2]);
-  };
-  if (shape == "infinite" && numbers.empty()) return Proxy{};
-  if (shape == "sphere" && numbers.size() == 4) {
-    return Proxy{Ellipsoid{vector(0), glm::vec3(numbers[3])}, vector(0)};
-  }
-  if (shape == "box" && numbers.size() == 6) return Proxy{Box{vector(0), vector(3)}, vector(0)};
-  if (shape == "ellipsoid" && numbers.size() == 6) return Proxy{Ellipsoid{vector(0), vector(3)}, vector(0)};
-  if (shape == "hemisphere" && numbers.size() == 4) {
-    // The centre lies on the floor.
-    return Proxy{Hemisphere{vector(0), numbers[3]}, vector(0) + glm::vec3(0.0F, 0.5F * numbers[3], 0.0F)};
-  }
-  return std::nullopt;
+std::optional<Proxy> proxy_of(std::string_view shape, std::span<const float> numbers) {
+  if (numbers.empty()) return proxy_from_numbers(shape, glm::vec3(0.0F), {});
+  if (numbers.size() < 4) return std::nullopt;
+  const glm::vec3 centre(numbers[0], numbers[1], numbers[2]);
+  const std::span<const float> extents = numbers.subspan(3);
+  if (shape != "sphere") return proxy_from_numbers(shape, centre, extents);
+  if (extents.size() != 1) return std::nullopt;
+  return proxy_from_numbers("ellipsoid", centre, std::vector<float>(3, extents[0]));
 }
 
 LayerShell parse_shell(const std::string& text) {
@@ -160,7 +154,7 @@ std::vector<LayerImage> Request::load() const {
 }
 
 void Request::check_output() const {
-  const PixelFormat pixels = parse_pixel_format(format);
+  const PixelFormat pixels = parse_name<PixelFormat>(format);
   if (stores_levels(output)) {
     check_envmap_path(path_of({"map", false, {}}), target(), FaceLayout::automatic, pixels);
   } else {
@@ -198,7 +192,7 @@ std::vector<Image> join_layers(const std::vector<std::string>& names,
 // The paths of the files.
 std::vector<std::string> Request::save(const LayerInference& inference) const {
   const bool apart = output.find("{}") != std::string::npos;
-  const PixelFormat pixels = parse_pixel_format(format);
+  const PixelFormat pixels = parse_name<PixelFormat>(format);
   if (!apart && stores_levels(output) && inference.maps.size() > 1) {
     throw InvalidArgument(
         "--output", output,

@@ -22,7 +22,7 @@ class Beauty final : public Command {
 
   void run(bool json) const override {
     const Stopwatch watch;
-    check_image_path(request_.output, parse_pixel_format(request_.format));
+    check_image_path(request_.output, parse_name<PixelFormat>(request_.format));
     const TraceOptions options = request_.trace_options();
     Source source = request_.load();
     const Camera camera = request_.camera(source);

@@ -37,8 +37,8 @@ class Capture final : public Command {
   void run(bool json) const override {
     const Stopwatch watch;
     const EnvMapLayout map = map_layout();
-    const FaceLayout face_layout = parse_face_layout(layout_);
-    const PixelFormat format = parse_pixel_format(request_.format);
+    const FaceLayout face_layout = parse_name<FaceLayout>(layout_, "layout");
+    const PixelFormat format = parse_name<PixelFormat>(request_.format);
     check_envmap_path(request_.output, map.projection, face_layout, format);
     const Tracer tracer = request_.tracer(request_.load());
     const glm::vec3 from = origin_.empty() ? glm::vec3(0.0F) : glm::vec3(origin_[0], origin_[1], origin_[2]);

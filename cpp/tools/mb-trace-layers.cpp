@@ -32,7 +32,7 @@ class Layers final : public Command {
 
   void run(bool json) const override {
     const Stopwatch watch;
-    PixelFormat format = parse_pixel_format(request_.format);
+    PixelFormat format = parse_name<PixelFormat>(request_.format);
     if (!run_time_.empty() && format == PixelFormat::automatic) format = PixelFormat::float32;
     check_image_path(request_.output, format);
     const RunTimeModel run_time = run_time_.empty() ? RunTimeModel{} : run_time_model(run_time_);

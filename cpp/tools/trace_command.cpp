@@ -231,9 +231,7 @@ TraceOptions Request::trace_options() const {
 
 Tracer Request::tracer(Source source) const {
   TracerOptions options;
-  options.indirect = indirect == "path"     ? IndirectLight::path
-                     : indirect == "cached" ? IndirectLight::cached
-                                            : IndirectLight::none;
+  options.indirect = parse_name<IndirectLight>(indirect);
   options.seed = seed;
   return Tracer(std::move(source.scene), options);
 }

@@ -53,7 +53,7 @@ struct Request {
   TraceOptions trace_options() const;
   Tracer tracer(Source source) const;
 
-  void save(const Image& image) const { warn(save_image(output, image, parse_pixel_format(format))); }
+  void save(const Image& image) const { warn(save_image(output, image, parse_name<PixelFormat>(format))); }
   void warn(const SaveReport& report) const { warn_of_losses("mb-trace", output, report); }
 };
 

@@ -17,16 +17,6 @@
 namespace mirrorbake {
 namespace {
 
-constexpr std::array<std::pair<FaceLayout, std::string_view>, 7> kNames = {{
-    {FaceLayout::automatic, "automatic"},
-    {FaceLayout::strip, "strip"},
-    {FaceLayout::column, "column"},
-    {FaceLayout::grid, "grid"},
-    {FaceLayout::cross, "cross"},
-    {FaceLayout::vertical_cross, "vertical_cross"},
-    {FaceLayout::files, "files"},
-}};
-
 // Where the faces are, in units of a face.
 struct Cell {
   int column, row;
@@ -177,23 +167,12 @@ std::optional<MapFile> file_of_levels(const std::string& name, const image_files
 
 }  // namespace
 
-FaceLayout parse_face_layout(std::string_view name) {
-  for (const auto& [layout, known] : kNames) {
-    if (name == known) return layout;
-  }
-  throw InvalidArgument("layout", name, "automatic, strip, column, grid, cross, vertical_cross or files");
-}
-
-std::string_view to_string(FaceLayout layout) {
-  return std::find_if(kNames.begin(), kNames.end(), [&](const auto& n) { return n.first == layout; })->second;
-}
-
 Image pack_faces(const EnvMapView& map, int level, FaceLayout layout) {
   validate(map);
   const int faces = face_count(map.layout.projection);
   const std::optional<Arrangement> a = arrangement(layout, faces);
   if (!a) {
-    throw InvalidArgument("layout", to_string(layout),
+    throw InvalidArgument("layout", name_of(layout),
                           "one for the " + std::to_string(faces) + " faces of this map");
   }
   std::vector<std::string> names(map.channels.begin(), map.channels.end());
@@ -227,7 +206,8 @@ EnvMap unpack_faces(const Image& image, const std::optional<Projection>& project
     chosen = arrangement(layout, faces);
     if (chosen && !fits(*chosen)) chosen.reset();
   } else {
-    for (const auto& [candidate, name] : kNames) {
+    for (std::size_t i = 0; i < EnumNames<FaceLayout>::names.size(); ++i) {
+      const auto candidate = static_cast<FaceLayout>(i);
       if (candidate == FaceLayout::automatic || candidate == FaceLayout::files) continue;
       const std::optional<Arrangement> a = arrangement(candidate, faces);
       // Two faces side by side or above each other are told apart by being square.
@@ -241,7 +221,7 @@ EnvMap unpack_faces(const Image& image, const std::optional<Projection>& project
     throw InvalidArgument(
         "image", shape,
         projection ? "the faces of the projection " + to_string(found) + " in the layout " +
-                         std::string(to_string(layout))
+                         std::string(name_of(layout))
                    : "a panorama (2:1) or a cube (6:1, 1:6, 3:2, 4:3 or 3:4), or a named projection");
   }
   EnvMap map = make_envmap(
@@ -348,7 +328,7 @@ void check_envmap_path(const std::string& path, const Projection& projection, Fa
       check_ktx2_path(path, projection, format);
     }
     if (layout != FaceLayout::automatic) {
-      throw InvalidArgument("layout", to_string(layout),
+      throw InvalidArgument("layout", name_of(layout),
                             "automatic: a KTX2 or DDS file has a layout of its own");
     }
     return;
@@ -362,12 +342,12 @@ void check_envmap_path(const std::string& path, const Projection& projection, Fa
   check_image_path(several && faces > 1 ? face_path(path, projection, 0) : path, format);
   if (several && faces == 1) throw InvalidArgument("path", path, "no {}: the map has one face");
   if (several && layout != FaceLayout::automatic && layout != FaceLayout::files) {
-    throw InvalidArgument("layout", to_string(layout), "files, as " + path + " names one image per face");
+    throw InvalidArgument("layout", name_of(layout), "files, as " + path + " names one image per face");
   }
   if (several) return;
   if (layout == FaceLayout::files) throw InvalidArgument("path", path, "a path with {} for the face");
   if (!arrangement(layout, faces)) {
-    throw InvalidArgument("layout", to_string(layout), "strip or column for " + to_string(projection));
+    throw InvalidArgument("layout", name_of(layout), "strip or column for " + to_string(projection));
   }
 }
 

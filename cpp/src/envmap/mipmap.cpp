@@ -122,13 +122,6 @@ void restore_mean(EnvMap& map, int level, const std::vector<double>& flux) {
 
 }  // namespace
 
-MipFilter parse_mip_filter(std::string_view name) {
-  if (name == "box") return MipFilter::box;
-  if (name == "solid_angle") return MipFilter::solid_angle;
-  if (name == "seamless") return MipFilter::seamless;
-  throw InvalidArgument("filter", name, "box, solid_angle or seamless");
-}
-
 EnvMap build_mips(const EnvMapView& map, MipFilter filter) {
   validate(map);
   EnvMapLayout layout = map.layout;

@@ -15,12 +15,6 @@
 namespace mirrorbake {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, LookupFilter>, 4> kFilters{
-    {{"nearest", LookupFilter::nearest},
-     {"bilinear", LookupFilter::bilinear},
-     {"trilinear", LookupFilter::trilinear},
-     {"anisotropic", LookupFilter::anisotropic}}};
-
 // Up to this elongation a footprint is round enough for one tap.
 constexpr float kRound = 1.25F;
 
@@ -75,16 +69,6 @@ void add_nearest(const TexelTopology& topology, glm::vec3 direction, TexelReads&
 }
 
 }  // namespace
-
-LookupFilter parse_lookup_filter(std::string_view name) {
-  for (const auto& [text, filter] : kFilters) {
-    if (text == name) return filter;
-  }
-  throw InvalidArgument("filter", "'" + std::string(name) + "'",
-                        "nearest, bilinear, trilinear or anisotropic");
-}
-
-std::string_view name_of(LookupFilter filter) { return kFilters[static_cast<std::size_t>(filter)].first; }
 
 TapPattern tap_pattern(float major, float minor, int max_taps, int levels) {
   TapPattern pattern;

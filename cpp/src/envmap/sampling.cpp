@@ -272,14 +272,6 @@ void check(const SampleOptions& options, std::size_t directions) {
 
 }  // namespace
 
-SampleFilter parse_sample_filter(std::string_view name) {
-  if (name == "nearest") return SampleFilter::nearest;
-  if (name == "bilinear") return SampleFilter::bilinear;
-  if (name == "trilinear") return SampleFilter::trilinear;
-  if (name == "ewa") return SampleFilter::ewa;
-  throw InvalidArgument("filter", name, "nearest, bilinear, trilinear or ewa");
-}
-
 std::size_t sample(const EnvMapView& map, std::span<const glm::vec3> directions,
                    std::span<const glm::vec3> ddx, std::span<const glm::vec3> ddy,
                    const SampleOptions& options, std::span<float> values) {

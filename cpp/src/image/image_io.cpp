@@ -181,15 +181,13 @@ auto file_errors(const std::string& name, const char* problem, const Work& work)
 
 constexpr const char* kDamaged = "is damaged or truncated";
 
-constexpr std::array kFormatNames{"automatic", "half", "float32", "uint8", "uint16"};
-
 PixelFormat storage_format(const std::string& path, FileKind kind, PixelFormat format) {
   const auto& formats = image_files::row_of(kind).formats;
   if (format == PixelFormat::automatic) return formats.front();
   std::vector<std::string> expected;
   for (const PixelFormat own : formats) {
     if (own == format) return format;
-    if (own != PixelFormat::automatic) expected.emplace_back(kFormatNames[static_cast<std::size_t>(own)]);
+    if (own != PixelFormat::automatic) expected.emplace_back(name_of(own));
   }
   throw FileError(path, "its format cannot store these pixels, expected " + listed(expected));
 }
@@ -202,14 +200,6 @@ void check_channels(const std::string& path, FileKind kind, std::span<const std:
 }
 
 }  // namespace
-
-PixelFormat parse_pixel_format(std::string_view name) {
-  for (std::size_t i = 0; i < kFormatNames.size(); ++i) {
-    if (name == kFormatNames[i]) return static_cast<PixelFormat>(i);
-  }
-  throw InvalidArgument("format", name,
-                        listed(std::vector<std::string>(kFormatNames.begin(), kFormatNames.end())));
-}
 
 std::vector<std::string> default_channels(int count) {
   switch (count) {

@@ -162,13 +162,6 @@ Harmonics lambert_harmonics(const Harmonics& radiance) {
   return scaled(radiance, lambert_factor);
 }
 
-HarmonicWindow parse_harmonic_window(std::string_view name) {
-  if (name == "none") return HarmonicWindow::none;
-  if (name == "hanning") return HarmonicWindow::hanning;
-  if (name == "sloan") return HarmonicWindow::sloan;
-  throw InvalidArgument("window", name, "none, hanning or sloan");
-}
-
 Harmonics windowed(const Harmonics& harmonics, HarmonicWindow window) {
   validate(harmonics);
   if (window == HarmonicWindow::none) return harmonics;

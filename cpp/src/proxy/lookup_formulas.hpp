@@ -81,14 +81,18 @@ inline double hemisphere_exit(const Vec& p, const Vec& d) {
   return d.y < 0 && floor < sphere ? floor : sphere;
 }
 
-/// Rotates and scales into the shape's own coordinates; boxes are not scaled. The aligned version leaves out
+/// Whether the shape's own coordinates are in units of its size. Those of a box are not, which saves
+/// roundings: its extent is subtracted.
+constexpr bool is_scaled(LookupShape shape) { return shape != LookupShape::box; }
+
+/// Rotates and scales into the shape's own coordinates. The aligned version leaves out
 /// products with zeros and ones, which changes no bit of the result but the sign of a zero, to which the
 /// formulas are indifferent.
 template <LookupShape shape, bool rotated>
 inline Vec local_direction(const LookupConstants& k, const Vec& d) {
   if constexpr (rotated) {
     return {dot(vec(k.rows), d), dot(vec(k.rows + 3), d), dot(vec(k.rows + 6), d)};
-  } else if constexpr (shape == LookupShape::box) {
+  } else if constexpr (!is_scaled(shape)) {
     return d;
   } else {
     return {k.rows[0] * d.x, k.rows[4] * d.y, k.rows[8] * d.z};

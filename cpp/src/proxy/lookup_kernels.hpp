@@ -9,13 +9,13 @@ namespace mirrorbake {
 enum class LookupShape : int;  // lookup_formulas.hpp
 
 /// A proxy as the loops want it: local = rows · (p − centre), where the rows of the 3×3 matrix are the
-/// proxy's axes, divided by the radii for curved shapes.
+/// proxy's axes, divided by its size along them for shapes that are scaled.
 struct LookupConstants {
   LookupShape shape{};
   bool rotated = false;
   double centre[3] = {};
   double rows[9] = {};
-  double extent[3] = {};  ///< of a box
+  double extent[3] = {};  ///< its size along the axes
   double origin[3] = {};
 };
 

@@ -21,48 +21,31 @@ namespace {
 
 static_assert(std::variant_size_v<decltype(Proxy::shape)> == static_cast<std::size_t>(LookupShape::count));
 
-void check_extent(const char* name, glm::vec3 v) {
+template <typename Shape, typename Function>
+void for_each_extent(const Function& function) {
+  std::apply([&](const auto&... extent) { (function(extent), ...); }, ShapeTraits<Shape>::extents);
+}
+
+void check_extent(const std::string& name, glm::vec3 v) {
   if (!is_finite(v) || !(v.x > 0 && v.y > 0 && v.z > 0)) {
     throw InvalidArgument(name, text_of(v), "positive and finite");
   }
 }
 
-/// < 1 inside, in units of the extents.
-double gauge(const Box& box, glm::vec3 p) {
-  const glm::dvec3 q = glm::abs(glm::dmat3(box.proxy_from_world) * (glm::dvec3(p) - glm::dvec3(box.centre))) /
-                       glm::dvec3(box.half_extent);
-  return std::max({q.x, q.y, q.z});
-}
+void check_shape(const InfiniteSphere&, glm::vec3) {}
 
-double gauge(const Ellipsoid& ellipsoid, glm::vec3 p) {
-  return glm::length(glm::dmat3(ellipsoid.proxy_from_world) * (glm::dvec3(p) - glm::dvec3(ellipsoid.centre)) /
-                     glm::dvec3(ellipsoid.radii));
-}
-
-double gauge(const Hemisphere& dome, glm::vec3 p) {
-  const glm::dvec3 q = glm::dmat3(dome.proxy_from_world) * (glm::dvec3(p) - glm::dvec3(dome.centre)) /
-                       static_cast<double>(dome.radius);
-  return std::max(glm::length(q), 1.0 - q.y);
-}
-
-void check_shape(const InfiniteSphere&) {}
-
-void check_shape(const Box& box) {
-  check_finite("box centre", box.centre);
-  check_extent("box half_extent", box.half_extent);
-  check_orthonormal("box proxy_from_world", box.proxy_from_world);
-}
-
-void check_shape(const Ellipsoid& ellipsoid) {
-  check_finite("ellipsoid centre", ellipsoid.centre);
-  check_extent("ellipsoid radii", ellipsoid.radii);
-  check_orthonormal("ellipsoid proxy_from_world", ellipsoid.proxy_from_world);
-}
-
-void check_shape(const Hemisphere& dome) {
-  check_finite("hemisphere centre", dome.centre);
-  check_extent("hemisphere radius", glm::vec3(dome.radius));
-  check_orthonormal("hemisphere proxy_from_world", dome.proxy_from_world);
+template <PlacedShape Shape>
+void check_shape(const Shape& shape, glm::vec3 origin) {
+  using Traits = ShapeTraits<Shape>;
+  const std::string name = std::string(Traits::name) + " ";
+  check_finite(name + "centre", shape.centre);
+  for_each_extent<Shape>(
+      [&](const auto& extent) { check_extent(name + extent.name, glm::vec3(shape.*(extent.member))); });
+  check_orthonormal(name + "proxy_from_world", shape.proxy_from_world);
+  const glm::dvec3 from_centre = glm::dvec3(origin) - glm::dvec3(shape.centre);
+  const double gauge =
+      Traits::gauge(glm::dmat3(shape.proxy_from_world) * from_centre / glm::dvec3(Traits::size(shape)));
+  if (!(gauge < 1.0)) throw InvalidArgument("proxy origin", text_of(origin), "a point inside of the shape");
 }
 
 void set(double (&to)[3], glm::vec3 from) {
@@ -81,17 +64,37 @@ void set_frame(LookupConstants& k, glm::vec3 centre, const glm::mat3& proxy_from
 
 void set_shape(LookupConstants&, const InfiniteSphere&) {}
 
-void set_shape(LookupConstants& k, const Box& box) {
-  set_frame(k, box.centre, box.proxy_from_world, glm::dvec3(1.0));
-  set(k.extent, box.half_extent);
+template <PlacedShape Shape>
+void set_shape(LookupConstants& k, const Shape& shape) {
+  const glm::vec3 size = ShapeTraits<Shape>::size(shape);
+  set_frame(k, shape.centre, shape.proxy_from_world,
+            baseline::is_scaled(k.shape) ? 1.0 / glm::dvec3(size) : glm::dvec3(1.0));
+  set(k.extent, size);
 }
 
-void set_shape(LookupConstants& k, const Ellipsoid& ellipsoid) {
-  set_frame(k, ellipsoid.centre, ellipsoid.proxy_from_world, 1.0 / glm::dvec3(ellipsoid.radii));
-}
+std::span<float> numbers_of(float& extent) { return {&extent, 1}; }
+std::span<float> numbers_of(glm::vec3& extent) { return {&extent.x, 3}; }
 
-void set_shape(LookupConstants& k, const Hemisphere& dome) {
-  set_frame(k, dome.centre, dome.proxy_from_world, glm::dvec3(1.0 / static_cast<double>(dome.radius)));
+template <typename Shape>
+std::optional<Proxy> from_numbers(glm::vec3 centre, std::span<const float> extents,
+                                  const glm::mat3& proxy_from_world) {
+  Shape shape;
+  std::size_t used = 0;
+  for_each_extent<Shape>([&](const auto& extent) {
+    for (float& number : numbers_of(shape.*(extent.member))) {
+      if (used < extents.size()) number = extents[used];
+      ++used;
+    }
+  });
+  if (used != extents.size()) return std::nullopt;
+  Proxy proxy;
+  if constexpr (PlacedShape<Shape>) {
+    shape.centre = centre;
+    shape.proxy_from_world = proxy_from_world;
+    proxy.origin = centre + glm::transpose(proxy_from_world) * ShapeTraits<Shape>::inside(shape);
+  }
+  proxy.shape = shape;
+  return proxy;
 }
 
 }  // namespace
@@ -110,24 +113,42 @@ Proxy translated(const Proxy& proxy, glm::dvec3 by) {
   move(result.origin);
   std::visit(
       [&](auto& shape) {
-        if constexpr (!std::is_same_v<std::decay_t<decltype(shape)>, InfiniteSphere>) move(shape.centre);
+        if constexpr (PlacedShape<std::decay_t<decltype(shape)>>) move(shape.centre);
       },
       result.shape);
   return result;
 }
 
-void validate(const Proxy& proxy) {
-  check_finite("proxy origin", proxy.origin);
+const char* shape_name(const Proxy& proxy) {
+  return std::visit([]<typename Shape>(const Shape&) { return ShapeTraits<Shape>::name; }, proxy.shape);
+}
+
+std::optional<Proxy> proxy_from_numbers(std::string_view name, glm::vec3 centre,
+                                        std::span<const float> extents, const glm::mat3& proxy_from_world) {
+  std::optional<Proxy> found;
+  const auto try_shape = [&]<typename Shape>(const Shape&) {
+    if (name == ShapeTraits<Shape>::name) found = from_numbers<Shape>(centre, extents, proxy_from_world);
+  };
+  [&]<typename... Shape>(const std::variant<Shape...>&) { (try_shape(Shape{}), ...); }(Proxy{}.shape);
+  return found;
+}
+
+std::vector<float> extents_of(const Proxy& proxy) {
+  std::vector<float> numbers;
   std::visit(
-      [&](const auto& shape) {
-        check_shape(shape);
-        if constexpr (!std::is_same_v<std::decay_t<decltype(shape)>, InfiniteSphere>) {
-          if (!(gauge(shape, proxy.origin) < 1.0)) {
-            throw InvalidArgument("proxy origin", text_of(proxy.origin), "a point inside of the shape");
-          }
-        }
+      [&]<typename Shape>(Shape shape) {
+        for_each_extent<Shape>([&](const auto& extent) {
+          const std::span<float> own = numbers_of(shape.*(extent.member));
+          numbers.insert(numbers.end(), own.begin(), own.end());
+        });
       },
       proxy.shape);
+  return numbers;
+}
+
+void validate(const Proxy& proxy) {
+  check_finite("proxy origin", proxy.origin);
+  std::visit([&](const auto& shape) { check_shape(shape, proxy.origin); }, proxy.shape);
 }
 
 }  // namespace mirrorbake

@@ -206,10 +206,10 @@ TEST_F(EnvMapFiles, EveryFaceLayoutComesBackAndIsRecognisedByItsShape) {
   for (const FaceLayout layout : {FaceLayout::strip, FaceLayout::column, FaceLayout::grid, FaceLayout::cross,
                                   FaceLayout::vertical_cross}) {
     save_envmap(path("cube.exr"), cube, layout, PixelFormat::float32);
-    EXPECT_EQ(load_envmap(path("cube.exr")).values, cube.values) << to_string(layout);
+    EXPECT_EQ(load_envmap(path("cube.exr")).values, cube.values) << name_of(layout);
     EXPECT_EQ(load_envmap(path("cube.exr"), cube.layout.projection, layout).values, cube.values)
-        << to_string(layout);
-    EXPECT_EQ(parse_face_layout(to_string(layout)), layout);
+        << name_of(layout);
+    EXPECT_EQ(parse_name<FaceLayout>(name_of(layout)), layout);
   }
   save_envmap(path("cube_{}.exr"), cube, FaceLayout::files, PixelFormat::float32);
   EXPECT_TRUE(fs::exists(path("cube_nz.exr")));

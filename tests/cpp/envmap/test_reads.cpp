@@ -213,9 +213,9 @@ TEST(Reads, AnAtlasIsReadAtItsTextureCoordinates) {
 
 TEST(Reads, NamesOfFiltersRoundTrip) {
   for (const char* name : {"nearest", "bilinear", "trilinear", "anisotropic"}) {
-    EXPECT_EQ(name_of(parse_lookup_filter(name)), name);
+    EXPECT_EQ(name_of(parse_name<LookupFilter>(name)), name);
   }
-  EXPECT_THROW(parse_lookup_filter("ewa"), InvalidArgument);
+  EXPECT_THROW(parse_name<LookupFilter>("ewa"), InvalidArgument);
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ TEST(Resample, ConstantsStayConstantBetweenAnyTwoProjections) {
         for (const char* filter : {"automatic", "area", "bilinear", "nearest"}) {
           for (const int target_size : {1, 5, 16}) {
             const EnvMap result = resample(source, parse_projection(to), target_size, target_size,
-                                           {parse_resample_filter(filter)});
+                                           {parse_name<ResampleFilter>(filter)});
             for (const float v : result.values) {
               ASSERT_NEAR(v, 0.7F, 1e-6F) << from << " to " << to << ", " << filter << ", " << target_size;
             }

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 
 /// Other programs' orientations of environment maps, by name (spec §0). Ours: a panorama looks along −Z in
@@ -25,6 +26,12 @@ std::span<const std::string_view> convention_names();
 
 /// Which way a map is taken between a convention and ours.
 enum class ConventionWay { from_foreign, to_foreign };
+
+template <>
+struct EnumNames<ConventionWay> {
+  static constexpr std::string_view what = "way";
+  static constexpr auto names = enum_names("from_foreign", "to_foreign");
+};
 
 /// The map such that a lookup of (x, y, z) gives what the other program's lookup of (x, y, z) gives; +Y stays
 /// +Y, even if the other program calls another axis up. The same texels in another order, exactly, if texels

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 #include "mirrorbake/image/image_io.hpp"
 
@@ -25,8 +26,12 @@ namespace mirrorbake {
 /// paraboloid).
 enum class FaceLayout { automatic, strip, column, grid, cross, vertical_cross, files };
 
-FaceLayout parse_face_layout(std::string_view name);
-std::string_view to_string(FaceLayout layout);
+template <>
+struct EnumNames<FaceLayout> {
+  static constexpr std::string_view what = "faces";
+  static constexpr auto names =
+      enum_names("automatic", "strip", "column", "grid", "cross", "vertical_cross", "files");
+};
 
 /// One level of a map as an image; a map of one face is its face. Throws InvalidArgument for a cross or grid
 /// of anything but a cube, and for `files`.

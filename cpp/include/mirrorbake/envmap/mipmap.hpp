@@ -3,6 +3,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 
 namespace mirrorbake {
@@ -15,7 +16,11 @@ namespace mirrorbake {
 /// other in an edge have the same solid angle. For projections other than the cube it is `solid_angle`.
 enum class MipFilter { box, solid_angle, seamless };
 
-MipFilter parse_mip_filter(std::string_view name);
+template <>
+struct EnumNames<MipFilter> {
+  static constexpr std::string_view what = "filter";
+  static constexpr auto names = enum_names("box", "solid_angle", "seamless");
+};
 
 /// All levels down to 1×1 from the finest level of `map`. Where a side is odd, the last texel covers three;
 /// the weighted filters then rescale the channels of the level that are not negative by the factor that

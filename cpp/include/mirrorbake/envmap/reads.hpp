@@ -6,6 +6,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/footprint.hpp"
 #include "mirrorbake/envmap/texel_topology.hpp"
 
@@ -17,8 +18,11 @@ namespace mirrorbake {
 /// next to its level of detail; `anisotropic` several trilinear taps along the longer differential.
 enum class LookupFilter { nearest, bilinear, trilinear, anisotropic };
 
-LookupFilter parse_lookup_filter(std::string_view name);
-std::string_view name_of(LookupFilter filter);
+template <>
+struct EnumNames<LookupFilter> {
+  static constexpr std::string_view what = "filter";
+  static constexpr auto names = enum_names("nearest", "bilinear", "trilinear", "anisotropic");
+};
 
 struct ReadFilter {
   LookupFilter kind = LookupFilter::anisotropic;

@@ -7,6 +7,7 @@
 
 #include <glm/mat3x3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 
 /// From any projection to any other (spec P7).
@@ -21,7 +22,11 @@ namespace mirrorbake {
 /// blend in between. It conserves flux, too, but for what the change from one to the other moves.
 enum class ResampleFilter { automatic, area, bilinear, nearest };
 
-ResampleFilter parse_resample_filter(std::string_view name);
+template <>
+struct EnumNames<ResampleFilter> {
+  static constexpr std::string_view what = "filter";
+  static constexpr auto names = enum_names("automatic", "area", "bilinear", "nearest");
+};
 
 struct ResampleOptions {
   ResampleFilter filter = ResampleFilter::automatic;

@@ -6,6 +6,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 
 namespace mirrorbake {
@@ -17,7 +18,11 @@ namespace mirrorbake {
 /// edges and corners of faces.
 enum class SampleFilter { nearest, bilinear, trilinear, ewa };
 
-SampleFilter parse_sample_filter(std::string_view name);
+template <>
+struct EnumNames<SampleFilter> {
+  static constexpr std::string_view what = "filter";
+  static constexpr auto names = enum_names("nearest", "bilinear", "trilinear", "ewa");
+};
 
 struct SampleOptions {
   SampleFilter filter = SampleFilter::bilinear;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/image/image.hpp"
 
 /// Image files: EXR through OpenEXR; WebP through libwebp; HDR by a reader of its own; TIFF, PNG and JPEG,
@@ -25,8 +26,11 @@ struct ImageLimits {
 /// Pixel storage in a file. `automatic`: float16 for EXR, 8 bit for PNG and JPEG, float32 otherwise.
 enum class PixelFormat { automatic, half, float32, uint8, uint16 };
 
-/// "automatic", "half", "float32", "uint8" or "uint16". Throws InvalidArgument.
-PixelFormat parse_pixel_format(std::string_view name);
+template <>
+struct EnumNames<PixelFormat> {
+  static constexpr std::string_view what = "format";
+  static constexpr auto names = enum_names("automatic", "half", "float32", "uint8", "uint16");
+};
 
 struct SaveReport {
   std::uint64_t clamped_to_half =
@@ -71,6 +75,12 @@ ImageSize read_image_size(const std::string& path, const ImageLimits& limits = {
 
 /// Whether integers are decoded from sRGB: as load_image does, always (floats too), or never.
 enum class Transfer { automatic, srgb, linear };
+
+template <>
+struct EnumNames<Transfer> {
+  static constexpr std::string_view what = "transfer";
+  static constexpr auto names = enum_names("automatic", "srgb", "linear");
+};
 
 /// What becomes of an alpha channel: the colour is multiplied by it, as load_image does; it is dropped and
 /// the colour left as it is stored; or it alone is kept. Images without one stay as they are.

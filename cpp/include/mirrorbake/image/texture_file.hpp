@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/image/image_io.hpp"
 
 namespace mirrorbake {
@@ -14,6 +16,12 @@ namespace mirrorbake {
 /// How a coordinate outside [0,1] finds a texel: tiled, the border's, or tiled with every second tile
 /// mirrored.
 enum class TextureWrap { repeat, clamp, mirror };
+
+template <>
+struct EnumNames<TextureWrap> {
+  static constexpr std::string_view what = "wrap";
+  static constexpr auto names = enum_names("repeat", "clamp", "mirror");
+};
 
 /// An image file whose texels are read when a lookup needs them, through OpenImageIO's texture system: tiles
 /// of 64 × 64 texels of MIP levels in a cache of bounded size that all texture files share. Files without MIP

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 
 /// World projections as backgrounds: what a camera that turns, but does not move, sees of a map ([WP]).
@@ -14,6 +16,12 @@ namespace mirrorbake {
 /// Cameras look along −Z with +X to the right and +Y up. `perspective`: a plane. `fisheye`: equidistant, of
 /// 180 degrees for Omnimax.
 enum class Lens { perspective, fisheye };
+
+template <>
+struct EnumNames<Lens> {
+  static constexpr std::string_view what = "lens";
+  static constexpr auto names = enum_names("perspective", "fisheye");
+};
 
 /// Directions of the middles of width × height pixels, the top row first; NaN beyond the disc of a fisheye,
 /// whose diameter is the shorter side. `field_of_view` in degrees: of `perspective` that of the height, below

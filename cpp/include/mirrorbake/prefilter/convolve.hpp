@@ -3,7 +3,9 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string_view>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 #include "mirrorbake/prefilter/lobe.hpp"
 
@@ -13,6 +15,12 @@ namespace mirrorbake {
 /// `mean`: Σ weight Ω L / Σ weight Ω over the texels, which keeps white white. `sum`: Σ weight Ω L, as [AEM]
 /// eq. 7 has it with k_s = 1; of a mirror, whose weights sum to nothing, it is an error.
 enum class LobeScale { mean, sum };
+
+template <>
+struct EnumNames<LobeScale> {
+  static constexpr std::string_view what = "scale";
+  static constexpr auto names = enum_names("mean", "sum");
+};
 
 /// What there is to make. Values are those at the middles of the texels.
 struct PrefilterTarget {
@@ -61,6 +69,12 @@ EnvMap irradiance(const EnvMapView& map, const PrefilterTarget& target);
 /// How roughness runs over the levels of a chain. `squared`: α = (level / last)², since renderers look levels
 /// up by perceptual roughness. `linear`: α = level / last.
 enum class RoughnessScale { squared, linear };
+
+template <>
+struct EnumNames<RoughnessScale> {
+  static constexpr std::string_view what = "roughness";
+  static constexpr auto names = enum_names("squared", "linear");
+};
 
 struct ChainOptions {
   int size = 256;  ///< of the faces of the cube

@@ -6,6 +6,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/envmap/envmap.hpp"
 #include "mirrorbake/prefilter/convolve.hpp"
 
@@ -44,12 +45,22 @@ Harmonics lambert_harmonics(const Harmonics& radiance);
 /// is below 0 (Sloan, "Stupid Spherical Harmonics Tricks", GDC 2008); λ = 0 if none is.
 enum class HarmonicWindow { none, hanning, sloan };
 
-HarmonicWindow parse_harmonic_window(std::string_view name);
+template <>
+struct EnumNames<HarmonicWindow> {
+  static constexpr std::string_view what = "window";
+  static constexpr auto names = enum_names("none", "hanning", "sloan");
+};
 
 Harmonics windowed(const Harmonics& harmonics, HarmonicWindow window);
 
 /// What happens to sums below 0, which light cannot have.
 enum class NegativeLight { clamp, keep };
+
+template <>
+struct EnumNames<NegativeLight> {
+  static constexpr std::string_view what = "negative";
+  static constexpr auto names = enum_names("clamp", "keep");
+};
 
 /// The sums of the harmonics in the directions of the texels.
 EnvMap evaluate_harmonics(const Harmonics& harmonics, const PrefilterTarget& target,

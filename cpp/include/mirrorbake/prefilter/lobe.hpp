@@ -1,7 +1,9 @@
 #pragma once
 
+#include <string_view>
 #include <vector>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/projection/projection.hpp"
 
 /// Radially symmetric lobes (spec B1–B3): weights of light that arrives at an angle γ from the direction of a
@@ -13,6 +15,12 @@ namespace mirrorbake {
 /// sums of Karis, "Real Shading in Unreal Engine 4", 2013: D by Walter et al., EGSR 2007 eq. 33, h half-way
 /// to the light. `table`: any.
 enum class LobeKind { lambert, phong, ggx, table };
+
+template <>
+struct EnumNames<LobeKind> {
+  static constexpr std::string_view what = "kind";
+  static constexpr auto names = enum_names("lambert", "phong", "ggx", "table");
+};
 
 struct Lobe {
   LobeKind kind = LobeKind::lambert;

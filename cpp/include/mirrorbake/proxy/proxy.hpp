@@ -1,7 +1,14 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
 #include <span>
+#include <string_view>
+#include <tuple>
 #include <variant>
+#include <vector>
+#include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
@@ -31,14 +38,50 @@
 /// is exactly parallel to is ignored.
 namespace mirrorbake {
 
+/// One of the lengths that tell how large a shape is: metres, above 0. `Value` is float or glm::vec3.
+template <typename Shape, typename Value>
+struct ShapeExtent {
+  const char* name;
+  Value Shape::*member;
+  const char* meaning;
+};
+
+/// What the library, files and Python know of a shape, specialised beside it; where rays leave it is in
+/// src/proxy/lookup_formulas.hpp. All shapes but the infinite one have a `centre` and axes of their own in
+/// `proxy_from_world`, and
+///
+///  - `extents`, a tuple of ShapeExtent; in files and in Python they have these names,
+///  - `size`, lengths along the axes, in units of which `gauge` of a point seen from the centre is below 1 inside,
+///  - `inside`, a point clearly inside, along the axes and seen from the centre: the origin of maps, if none
+///    is given.
+template <typename Shape>
+struct ShapeTraits;
+
 /// The classic environment map: only the direction counts.
 struct InfiniteSphere {};
+
+template <>
+struct ShapeTraits<InfiniteSphere> {
+  static constexpr const char* name = "infinite";
+  static constexpr std::tuple<> extents;
+};
 
 /// A box with its own axes; `proxy_from_world` rotates world directions into them (identity: axis-aligned).
 struct Box {
   glm::vec3 centre{0.0F};
   glm::vec3 half_extent{1.0F};  ///< > 0
   glm::mat3 proxy_from_world{1.0F};
+};
+
+template <>
+struct ShapeTraits<Box> {
+  static constexpr const char* name = "box";
+  static constexpr const char* meaning = "A box.";
+  static constexpr std::tuple extents = {ShapeExtent<Box, glm::vec3>{
+      "half_extent", &Box::half_extent, "Half the box's edge lengths, along its axes."}};
+  static glm::vec3 size(const Box& box) { return box.half_extent; }
+  static double gauge(const glm::dvec3& q) { return std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z)}); }
+  static glm::vec3 inside(const Box&) { return glm::vec3(0.0F); }
 };
 
 /// An ellipsoid with its own axes; a finite sphere has three equal radii.
@@ -48,6 +91,17 @@ struct Ellipsoid {
   glm::mat3 proxy_from_world{1.0F};
 };
 
+template <>
+struct ShapeTraits<Ellipsoid> {
+  static constexpr const char* name = "ellipsoid";
+  static constexpr const char* meaning = "An ellipsoid.";
+  static constexpr std::tuple extents = {ShapeExtent<Ellipsoid, glm::vec3>{
+      "radii", &Ellipsoid::radii, "Radii of the ellipsoid along its axes."}};
+  static glm::vec3 size(const Ellipsoid& ellipsoid) { return ellipsoid.radii; }
+  static double gauge(const glm::dvec3& q) { return glm::length(q); }
+  static glm::vec3 inside(const Ellipsoid&) { return glm::vec3(0.0F); }
+};
+
 /// The half y ≥ 0, on its own axes, of a sphere, closed by a flat floor through the centre.
 struct Hemisphere {
   glm::vec3 centre{0.0F};  ///< of the floor's disc
@@ -55,10 +109,38 @@ struct Hemisphere {
   glm::mat3 proxy_from_world{1.0F};
 };
 
+template <>
+struct ShapeTraits<Hemisphere> {
+  static constexpr const char* name = "hemisphere";
+  static constexpr const char* meaning = "The half of a sphere above its own y = 0, closed by a flat floor.";
+  static constexpr std::tuple extents = {
+      ShapeExtent<Hemisphere, float>{"radius", &Hemisphere::radius, "Radius of the hemisphere."}};
+  static glm::vec3 size(const Hemisphere& dome) { return glm::vec3(dome.radius); }
+  static double gauge(const glm::dvec3& q) { return std::max(glm::length(q), 1.0 - q.y); }
+  static glm::vec3 inside(const Hemisphere& dome) { return {0.0F, 0.5F * dome.radius, 0.0F}; }
+};
+
+template <typename Shape>
+concept PlacedShape = requires(Shape shape) {
+  shape.centre;
+};
+
 struct Proxy {
   std::variant<InfiniteSphere, Box, Ellipsoid, Hemisphere> shape;
   glm::vec3 origin{0.0F};  ///< of the map, world space: lookups are directions seen from here
 };
+
+const char* shape_name(const Proxy& proxy);
+
+/// The shape of this name with these lengths, the origin at a point clearly inside; `extents` are those of
+/// its traits one after another. None for a name that is not known, or another number of lengths. Not
+/// validated.
+std::optional<Proxy> proxy_from_numbers(std::string_view name, glm::vec3 centre,
+                                        std::span<const float> extents,
+                                        const glm::mat3& proxy_from_world = glm::mat3(1.0F));
+
+/// The lengths that proxy_from_numbers takes.
+std::vector<float> extents_of(const Proxy& proxy);
 
 /// Direction in which the map is read by a ray from `position` along `direction` (any length > 0): from the
 /// map's origin to where the ray leaves the proxy, not normalised ([PEM] §4). For the infinite sphere it is

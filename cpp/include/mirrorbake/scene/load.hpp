@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/scene/scene.hpp"
 
 /// Meshes and scenes from files (OBJ, glTF 2.0 through tinygltf; their parsers stay behind this header).
@@ -73,6 +75,12 @@ LoadedScene load_scene(const std::string& path, const SceneOptions& options = {}
 
 /// Which of the two functions reads a file.
 enum class FileContent { mesh, scene };
+
+template <>
+struct EnumNames<FileContent> {
+  static constexpr std::string_view what = "content";
+  static constexpr auto names = enum_names("mesh", "scene");
+};
 
 /// The files beside `path` that load_mesh or load_scene would read: the external buffers of a glTF file and,
 /// for a scene, its images, or the material libraries of an OBJ file and their images. Absolute, each once,

@@ -4,10 +4,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/image/image.hpp"
 #include "mirrorbake/image/texture_file.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
@@ -66,9 +68,21 @@ Image texture_image(const Texture& texture);
 /// rough surfaces", EGSR 2007); or (r·l)^N, normalised ([EMT] eq. 17).
 enum class SpecularLobe { mirror, ggx, phong };
 
+template <>
+struct EnumNames<SpecularLobe> {
+  static constexpr std::string_view what = "lobe";
+  static constexpr auto names = enum_names("mirror", "ggx", "phong");
+};
+
 /// How diffuse and specular light add up ([EMT] §3; spec F5): `additive` is F·L_m + L_d, `coated` is
 /// F·L_m + (1−F)·L_d, for a diffuse body under a clear coat.
 enum class LayerModel { additive, coated };
+
+template <>
+struct EnumNames<LayerModel> {
+  static constexpr std::string_view what = "layers";
+  static constexpr auto names = enum_names("additive", "coated");
+};
 
 struct Material {
   std::string name;

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <span>
+#include <string_view>
 #include <glm/vec3.hpp>
+
+#include "mirrorbake/core/enum_names.hpp"
 
 /// Fresnel reflectance of smooth surfaces, unpolarised. In every function `c` is the cosine n·v on the side
 /// the light comes from. It is clamped to [0,1] and may be anything; a NaN gives NaN. The answer is in [0,1].
@@ -52,6 +55,12 @@ void fresnel_conductor(std::span<const double> c, std::span<const double> eta, s
 
 /// Which Fresnel model a material uses, with its parameters per colour channel.
 enum class FresnelModel { constant, schlick, dielectric, conductor };
+
+template <>
+struct EnumNames<FresnelModel> {
+  static constexpr std::string_view what = "model";
+  static constexpr auto names = enum_names("constant", "schlick", "dielectric", "conductor");
+};
 
 struct Fresnel {
   FresnelModel model = FresnelModel::constant;

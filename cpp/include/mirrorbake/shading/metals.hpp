@@ -5,6 +5,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/shading/fresnel.hpp"
 
 /// Metals from measured optical constants: spectra, their colour, and the models of fresnel.hpp closest to
@@ -38,6 +39,12 @@ OpticalConstants optical_constants(Metal metal);
 
 /// Light in which a colour is seen: CIE standard illuminant D65 or the equal-energy illuminant E.
 enum class Illuminant { d65, e };
+
+template <>
+struct EnumNames<Illuminant> {
+  static constexpr std::string_view what = "illuminant";
+  static constexpr auto names = enum_names("D65", "E");
+};
 
 /// Reflectance at cosine `c` as linear Rec.709: R, G, B of the reflected light over those of the light
 /// itself, CIE 1931 2° observer, 380 to 780 nm in steps of 5 nm. A mirror of reflectance 1 is (1, 1, 1) under

@@ -6,10 +6,12 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
+#include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/image/image.hpp"
 #include "mirrorbake/projection/projection.hpp"
 #include "mirrorbake/scene/scene.hpp"
@@ -25,6 +27,12 @@ namespace mirrorbake {
 /// without caustics (the glow of a lamp that a mirror throws on a wall). `path` follows random paths:
 /// unbiased, noisy. Direct light is sampled at every point in all three.
 enum class IndirectLight { none, cached, path };
+
+template <>
+struct EnumNames<IndirectLight> {
+  static constexpr std::string_view what = "indirect";
+  static constexpr auto names = enum_names("none", "cached", "path");
+};
 
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
@@ -48,6 +56,12 @@ struct PixelWindow {
 
 /// The front of a triangle is where its corners are counter-clockwise.
 enum class SurfaceSide { front, back };
+
+template <>
+struct EnumNames<SurfaceSide> {
+  static constexpr std::string_view what = "side";
+  static constexpr auto names = enum_names("front", "back");
+};
 
 struct TraceOptions {
   int samples_per_pixel = 16;  ///< 1…65536, stratified

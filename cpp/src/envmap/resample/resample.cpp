@@ -341,14 +341,6 @@ struct Resampler::Plan {
   std::size_t bytes = 0;
 };
 
-ResampleFilter parse_resample_filter(std::string_view name) {
-  if (name == "automatic") return ResampleFilter::automatic;
-  if (name == "area") return ResampleFilter::area;
-  if (name == "bilinear") return ResampleFilter::bilinear;
-  if (name == "nearest") return ResampleFilter::nearest;
-  throw InvalidArgument("filter", name, "automatic, area, bilinear or nearest");
-}
-
 Resampler::Resampler(const EnvMapLayout& source, const Projection& target, int width, int height,
                      const ResampleOptions& options, std::size_t max_bytes) {
   const EnvMapLayout result{target, width, height, 1, 1};

@@ -34,11 +34,17 @@ class Case:
         return self.peer / self.ours
 
 
+class Effort:
+    """How long `run` measures: --quick sees that all of it runs and that the answers agree, no more."""
+
+    quick = False
+
+
 def seconds(function: Callable[[], object], repetitions: int = 5) -> float:
     """Shortest of several runs, after one that warms caches up."""
     function()
     best = float("inf")
-    for _ in range(repetitions):
+    for _ in range(1 if Effort.quick else repetitions):
         start = time.perf_counter()
         function()
         best = min(best, time.perf_counter() - start)
@@ -47,7 +53,8 @@ def seconds(function: Callable[[], object], repetitions: int = 5) -> float:
 
 def seconds_in_turn(functions: Sequence[Callable[[], object]], repetitions: int) -> list[float]:
     """`seconds` of each, in five rounds: a clock that changes with time is the same for all."""
-    rounds = [[seconds(function, repetitions) for function in functions] for _ in range(5)]
+    count = 1 if Effort.quick else 5
+    rounds = [[seconds(function, repetitions) for function in functions] for _ in range(count)]
     return [min(times) for times in zip(*rounds, strict=True)]
 
 
@@ -61,7 +68,10 @@ def run(description: str, cases: Callable[[], Iterable[Case]]) -> None:
     """Command line of a benchmark: a table, or with --json one object per line."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--json", action="store_true", help="print one JSON object per case")
-    report(cases(), as_json=parser.parse_args().json)
+    parser.add_argument("--quick", action="store_true", help="measure once, to see that all of it runs")
+    arguments = parser.parse_args()
+    Effort.quick = arguments.quick
+    report(cases(), as_json=arguments.json)
 
 
 def report(cases: Iterable[Case], *, as_json: bool) -> None:

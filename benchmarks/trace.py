@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks import rays
 from benchmarks._mitsuba import mitsuba
-from benchmarks._report import Case, require, run, seconds
+from benchmarks._report import Case, Effort, require, run, seconds
 from mirrorbake import _core as core
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def contest(
         return tracer.trace_beauty(camera, options)
 
     # Fireflies, of Mitsuba's caustics above all, would decide alone: the worst 1 % of pixels are left out.
-    reference = np.mean([ours(1000 + i) for i in range(REFERENCE_SEEDS)], axis=0)
+    reference = np.mean([ours(1000 + i) for i in range(2 if Effort.quick else REFERENCE_SEEDS)], axis=0)
 
     def error(image: Any) -> float:
         square = ((image - reference) / np.maximum(reference, 0.01)) ** 2
@@ -233,7 +233,7 @@ def triangles() -> Iterator[Case]:
     """The ball of 10,000 triangles is the peer of the larger ones."""
     camera = core.Camera(EYE, TARGET, vertical_fov_degrees=FOV, width=256, height=256)
     first = 0.0
-    for segments in (100, 1000, 2236):
+    for segments in (100, 1000) if Effort.quick else (100, 1000, 2236):
         before = resident_megabytes()
         start = time.perf_counter()
         tracer = core.Tracer(

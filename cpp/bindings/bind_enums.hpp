@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include <nanobind/nanobind.h>
 
@@ -12,37 +13,41 @@
 /// several, such as Visibility, is an enum.Flag.)
 namespace mirrorbake::bindings {
 
+inline constexpr std::string_view kLiteral = "typing.Literal[";
+
+template <NamedEnum E>
+constexpr std::size_t literal_size() {
+  std::size_t size = kLiteral.size() + 1;
+  for (const std::string_view name : EnumNames<E>::names) size += name.size() + 4;
+  return size - 2;  // the first has no comma before it
+}
+
 /// typing.Literal['a', 'b'], at compile time.
 template <NamedEnum E>
 constexpr auto literal() {
-  constexpr std::string_view before = "typing.Literal[";
-  constexpr auto& names = EnumNames<E>::names;
-  constexpr std::size_t size = [] {
-    std::size_t sum = before.size() + 2 * (names.size() - 1) + 1;
-    for (const std::string_view name : names) sum += name.size() + 2;
-    return sum;
-  }();
-  char text[size + 1] = {};
+  char text[literal_size<E>() + 1] = {};
   std::size_t end = 0;
   const auto add = [&](std::string_view part) {
     for (const char letter : part) text[end++] = letter;
   };
-  add(before);
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  add(kLiteral);
+  for (std::size_t i = 0; i < EnumNames<E>::names.size(); ++i) {
     add(i == 0 ? "'" : ", '");
-    add(names[i]);
+    add(EnumNames<E>::names[i]);
     add("'");
   }
   add("]");
-  return nanobind::detail::descr<size>(text);
+  return nanobind::detail::descr<literal_size<E>()>(text);
 }
 
 }  // namespace mirrorbake::bindings
 
 namespace nanobind::detail {
 
-template <mirrorbake::NamedEnum E>
-struct type_caster<E> {
+// As nanobind's for all enumerations, but for the constraint, which makes it the one that is taken.
+template <typename E>
+requires mirrorbake::NamedEnum<E>
+struct type_caster<E, enable_if_t<std::is_enum_v<E>>> {
   static constexpr auto Name = mirrorbake::bindings::literal<E>();
   template <typename T>
   using Cast = E;

@@ -32,17 +32,6 @@ struct OwningConvolver {
       : values(std::move(array)), convolver(EnvMapView{layout, {values.data(), values.size()}}) {}
 };
 
-// `parameter` is the number that the kind of lobe has.
-Lobe lobe_of(LobeKind kind, double parameter, std::vector<double> table) {
-  Lobe lobe{kind};
-  if (kind == LobeKind::phong) lobe.exponent = parameter;
-  if (kind == LobeKind::ggx) lobe.alpha = parameter;
-  if (kind == LobeKind::table) lobe.table_angle = parameter;
-  lobe.table = std::move(table);
-  validate(lobe);
-  return lobe;
-}
-
 using DoubleMatrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 using DirectionImage = nb::ndarray<const double, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
@@ -77,7 +66,7 @@ void bind_lobes(nb::module_& m) {
       .def(
           "__init__",
           [](Lobe* self, LobeKind kind, double parameter, std::vector<double> table) {
-            new (self) Lobe(lobe_of(kind, parameter, std::move(table)));
+            new (self) Lobe(make_lobe(kind, parameter, std::move(table)));
           },
           nb::arg("kind"), nb::arg("parameter") = 1.0, nb::arg("table") = std::vector<double>{},
           "lambert; phong (exponent); ggx (alpha); table (largest angle in degrees, weights at equal steps).")

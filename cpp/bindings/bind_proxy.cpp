@@ -265,9 +265,8 @@ InvalidArgument
       .def("__getstate__", &proxy_state)
       .def("__setstate__",
            [](Proxy& self,
-              const std::tuple<std::string, glm::vec3, glm::vec3, glm::vec3, std::vector<float>>& state) {
-             new (&self) Proxy(std::apply(proxy_from_state, state));
-           })
+              const std::tuple<std::string, glm::vec3, glm::vec3, std::vector<float>, std::vector<float>>&
+                  state) { new (&self) Proxy(std::apply(proxy_from_state, state)); })
       .def("validate", &validate, "Raises InvalidArgument, naming the field, if the proxy is not usable.")
       .def("__repr__", [](const Proxy& p) {
         const nb::object self = nb::cast(p);
@@ -289,9 +288,8 @@ using ExtentValue = std::decay_t<decltype(Shape{}.*(std::get<i>(ShapeTraits<Shap
 template <typename Shape, std::size_t... i>
 void bind_shape(nb::class_<Proxy>& proxy, std::index_sequence<i...>) {
   using Traits = ShapeTraits<Shape>;
-  const std::string doc = std::string(Traits::meaning) +
-                          " `origin` has to lie inside; by default it is the centre, or above the floor. "
-                          "Raises InvalidArgument for unusable values.";
+  const std::string doc = std::string(Traits::meaning) + R"( `origin` has to lie inside (default: the
+centre, or above it where that is on a wall). Raises InvalidArgument for unusable values.)";
   proxy.def_static(
       Traits::name,
       [](glm::vec3 centre, ExtentValue<Shape, i>... extents, std::optional<glm::vec3> origin,

@@ -74,9 +74,10 @@ their distances to its surface.
 }
 
 void bind_choice(nb::module_& m) {
+  m.def("proxy_families", &proxy_families,
+        "Names of the families of shapes that choose_proxy() fits, in rising order of parameters.");
   nb::class_<ProxyCandidate>(m, "ProxyCandidate", "A shape that choose_proxy() fitted.")
-      .def_ro("name", &ProxyCandidate::name,
-              "'infinite', 'sphere', 'hemisphere', 'box', 'ellipsoid', 'rotated box' or 'rotated ellipsoid'.")
+      .def_ro("name", &ProxyCandidate::name, "One of proxy_families().")
       .def_ro("parameters", &ProxyCandidate::parameters, "Numbers that the fit sets.")
       .def_ro("proxy", &ProxyCandidate::proxy, "The shape, fitted to all views.")
       .def_ro("fit_error", &ProxyCandidate::fit_error, "Mean angle over the rays of the fit, radians.")

@@ -62,7 +62,7 @@ include(MirrorbakeEmbree)
 _mirrorbake_report(Embree embree_FOUND "${EMBREE_VERSION}" "3.13 or 4" libembree-dev "ray tracing")
 
 find_package(nlohmann_json CONFIG QUIET)
-_mirrorbake_report("JSON for Modern C++" nlohmann_json_FOUND "${nlohmann_json_VERSION}" 3.11 nlohmann-json3-dev "glTF meshes")
+_mirrorbake_report("JSON for Modern C++" nlohmann_json_FOUND "${nlohmann_json_VERSION}" 3.11 nlohmann-json3-dev "glTF meshes, and what the tools print")
 
 find_package(TinyGLTF CONFIG QUIET)
 _mirrorbake_report(tinygltf TinyGLTF_FOUND "${TinyGLTF_VERSION}" 2.6 libtinygltf-dev "glTF meshes")

@@ -91,11 +91,13 @@ struct Output {
         save_envmap(path, map, parse_name<FaceLayout>(layout, "layout"), parse_name<PixelFormat>(format));
     warn_of_losses("mb-envmap", path, report);
     if (!json) return;
-    std::cout << "{\"output\": " << json_string(path)
-              << ", \"projection\": " << json_string(to_string(map.layout.projection))
-              << ", \"width\": " << map.layout.width << ", \"height\": " << map.layout.height
-              << ", \"levels\": " << map.layout.levels << ", \"clamped_to_half\": " << report.clamped_to_half
-              << ", \"clipped\": " << report.clipped << "}\n";
+    print({{"output", path},
+           {"projection", to_string(map.layout.projection)},
+           {"width", map.layout.width},
+           {"height", map.layout.height},
+           {"levels", map.layout.levels},
+           {"clamped_to_half", report.clamped_to_half},
+           {"clipped", report.clipped}});
   }
 };
 

@@ -80,9 +80,11 @@ class Background final : public Command {
     const SaveReport report = save_image(path_, picture, format);
     warn_of_losses("mb-envmap", path_, report);
     if (json) {
-      std::cout << "{\"output\": " << json_string(path_) << ", \"width\": " << size.width
-                << ", \"height\": " << size.height << ", \"clamped_to_half\": " << report.clamped_to_half
-                << ", \"clipped\": " << report.clipped << "}\n";
+      print({{"output", path_},
+             {"width", size.width},
+             {"height", size.height},
+             {"clamped_to_half", report.clamped_to_half},
+             {"clipped", report.clipped}});
     }
   }
 

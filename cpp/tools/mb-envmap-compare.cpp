@@ -13,12 +13,13 @@ namespace {
 
 void print_comparison(const Comparison& c, bool json) {
   if (json) {
-    std::cout << "{\"max_error\": " << json_number(c.max_error)
-              << ", \"mean_error\": " << json_number(c.mean_error)
-              << ", \"rms_error\": " << json_number(c.rms_error)
-              << ", \"relative_l2\": " << json_number(c.relative_l2) << ", \"psnr\": " << json_number(c.psnr)
-              << ", \"flux_ratio\": " << json_number(c.flux_ratio) << ", \"not_finite\": " << c.not_finite
-              << "}\n";
+    print({{"max_error", c.max_error},
+           {"mean_error", c.mean_error},
+           {"rms_error", c.rms_error},
+           {"relative_l2", c.relative_l2},
+           {"psnr", c.psnr},
+           {"flux_ratio", c.flux_ratio},
+           {"not_finite", c.not_finite}});
     return;
   }
   std::cout << "max error    " << c.max_error << "\nmean error   " << c.mean_error << "\nRMS error    "

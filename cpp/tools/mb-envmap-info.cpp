@@ -33,16 +33,17 @@ void print_info(const Input& input, bool json) {
   for (double& m : mean) m /= whole * face_count(map.layout.projection);
   const std::size_t bad = count_not_finite(map);
   if (json) {
-    std::string names = "[";
-    for (std::size_t c = 0; c < map.channels.size(); ++c)
-      names += (c ? ", " : "") + json_string(map.channels[c]);
-    std::cout << "{\"path\": " << json_string(input.path)
-              << ", \"projection\": " << json_string(to_string(map.layout.projection))
-              << ", \"width\": " << map.layout.width << ", \"height\": " << map.layout.height
-              << ", \"faces\": " << face_count(map.layout.projection) << ", \"levels\": " << map.layout.levels
-              << ", \"channels\": " << names << "], \"min\": " << json_list(low)
-              << ", \"max\": " << json_list(high) << ", \"mean_radiance\": " << json_list(mean)
-              << ", \"not_finite\": " << bad << "}\n";
+    print({{"path", input.path},
+           {"projection", to_string(map.layout.projection)},
+           {"width", map.layout.width},
+           {"height", map.layout.height},
+           {"faces", face_count(map.layout.projection)},
+           {"levels", map.layout.levels},
+           {"channels", map.channels},
+           {"min", shortest(low)},
+           {"max", shortest(high)},
+           {"mean_radiance", mean},
+           {"not_finite", bad}});
     return;
   }
   std::cout << input.path << ": " << to_string(map.layout.projection) << ", "

@@ -52,26 +52,21 @@ bool has_extension(const std::string& path, std::string_view extension) {
          });
 }
 
-std::string rows_as_json(const std::vector<double>& values, int channels) {
-  std::string text = "[";
-  const std::size_t n = static_cast<std::size_t>(channels);
-  for (std::size_t i = 0; i < values.size(); i += n) {
-    text +=
-        (i ? ", " : "") + json_list(std::vector<double>(values.begin() + static_cast<std::ptrdiff_t>(i),
-                                                        values.begin() + static_cast<std::ptrdiff_t>(i + n)));
+Json rows_as_json(const std::vector<double>& values, int channels) {
+  Json rows = Json::array();
+  const auto n = static_cast<std::ptrdiff_t>(channels);
+  for (auto row = values.begin(); row != values.end(); row += n) {
+    rows.push_back(std::vector<double>(row, row + n));
   }
-  return text + "]";
+  return rows;
 }
 
 // Coefficients of radiance, as mirrorbake.prefilter.Harmonics reads them, and what shaders take.
-std::string harmonics_as_json(const Harmonics& light) {
-  std::string text = "{\"order\": " + std::to_string(light.order) +
-                     ",\n \"coefficients\": " + rows_as_json(light.coefficients, light.channels);
-  if (light.order >= 2) {
-    text += ",\n \"shader_constants\": " + rows_as_json(shader_constants(light), light.channels);
-  }
-  if (light.order == 2 && light.channels == 3) text += ",\n \"three_js\": " + json_list(light.coefficients);
-  return text + "}\n";
+Json harmonics_as_json(const Harmonics& light) {
+  Json json = {{"order", light.order}, {"coefficients", rows_as_json(light.coefficients, light.channels)}};
+  if (light.order >= 2) json["shader_constants"] = rows_as_json(shader_constants(light), light.channels);
+  if (light.order == 2 && light.channels == 3) json["three_js"] = light.coefficients;
+  return json;
 }
 
 // One row of (order + 1)² texels.
@@ -254,10 +249,10 @@ class Prefilter final : public Command {
     if (as_json || coefficients_) {
       const Harmonics damped = windowed(light, window);
       if (!as_json) return output_.save(harmonics_as_image(damped, source.channels), json);
-      const std::string text = harmonics_as_json(damped);
+      const std::string text = line_of(harmonics_as_json(damped));
       write_file(output_.path, {reinterpret_cast<const std::byte*>(text.data()), text.size()});
       if (json) {
-        std::cout << "{\"output\": " << json_string(output_.path) << ", \"order\": " << order_ << "}\n";
+        print({{"output", output_.path}, {"order", order_}});
       }
       return;
     }

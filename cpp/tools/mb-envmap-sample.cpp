@@ -34,7 +34,7 @@ void print_samples(EnvMap map, const std::vector<std::vector<float>>& directions
   std::vector<glm::vec3> d;
   for (const std::vector<float>& v : directions) {
     if (v.size() != 3) {
-      throw InvalidArgument("--direction", json_list(v),
+      throw InvalidArgument("--direction", std::to_string(v.size()) + " numbers",
                             "three numbers; repeat the option for more directions");
     }
     d.emplace_back(v[0], v[1], v[2]);
@@ -55,10 +55,9 @@ void print_samples(EnvMap map, const std::vector<std::vector<float>>& directions
     const std::vector<float> texel(values.begin() + static_cast<std::ptrdiff_t>(i * channels),
                                    values.begin() + static_cast<std::ptrdiff_t>((i + 1) * channels));
     if (json) {
-      std::cout << "{\"direction\": " << json_list(directions[i]) << ", \"value\": " << json_list(texel)
-                << "}\n";
+      print({{"direction", shortest(directions[i])}, {"value", shortest(texel)}});
     } else {
-      for (std::size_t c = 0; c < channels; ++c) std::cout << (c ? " " : "") << json_number(texel[c]);
+      for (std::size_t c = 0; c < channels; ++c) std::cout << (c ? " " : "") << text_of(texel[c]);
       std::cout << '\n';
     }
   }

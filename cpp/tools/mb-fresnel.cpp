@@ -187,24 +187,21 @@ void print_metal(const Options& options) {
   const MetalFit fit = fit_metal(metal, illuminant);
   const std::string name(to_string(metal));
   const std::string source(optical_constants(metal).source);
-  const auto row = [&](const char* label, glm::dvec3 v) {
-    std::printf(options.json ? ", \"%s\": [%.6g, %.6g, %.6g]" : "%-28s %8.4f %8.4f %8.4f\n", label, v.r, v.g,
-                v.b);
-  };
+  const std::pair<const char*, glm::dvec3> rows[] = {{"normal_incidence", normal},
+                                                     {"schlick_r0", fit.schlick.r0},
+                                                     {"schlick_max_error", fit.schlick_error},
+                                                     {"eta", fit.conductor.eta},
+                                                     {"k", fit.conductor.k},
+                                                     {"conductor_max_error", fit.conductor_error}};
   if (options.json) {
-    std::printf("{\"metal\": \"%s\", \"illuminant\": \"%s\", \"source\": \"%s\"", name.c_str(),
-                options.illuminant.c_str(), source.c_str());
-  } else {
-    std::printf("%s, %s\nlinear Rec.709, CIE 1931 2°, illuminant %s\n", name.c_str(), source.c_str(),
-                options.illuminant.c_str());
+    tool::Json json = {{"metal", name}, {"illuminant", options.illuminant}, {"source", source}};
+    for (const auto& [label, v] : rows) json[label] = {v.r, v.g, v.b};
+    tool::print(json);
+    return;
   }
-  row("normal_incidence", normal);
-  row("schlick_r0", fit.schlick.r0);
-  row("schlick_max_error", fit.schlick_error);
-  row("eta", fit.conductor.eta);
-  row("k", fit.conductor.k);
-  row("conductor_max_error", fit.conductor_error);
-  if (options.json) std::printf("}\n");
+  std::printf("%s, %s\nlinear Rec.709, CIE 1931 2°, illuminant %s\n", name.c_str(), source.c_str(),
+              options.illuminant.c_str());
+  for (const auto& [label, v] : rows) std::printf("%-28s %8.4f %8.4f %8.4f\n", label, v.r, v.g, v.b);
 }
 
 // Report
@@ -283,27 +280,31 @@ void report(const Options& options) {
     rows.push_back(report_row(std::string(to_string(metal)) + ", green", static_cast<double>(fit.eta.g),
                               static_cast<double>(fit.k.g), options.max_error));
   }
+  const std::string isa(to_string(active_isa()));
   if (options.json) {
-    std::printf("{\"isa\": \"%s\", \"threads\": %d, \"max_error\": %g, \"rows\": [",
-                std::string(to_string(active_isa())).c_str(), thread_count(), options.max_error);
-  } else {
-    std::printf("%-18s %10s %7s | %10s %7s | %7s %10s %7s   (%s, %d threads)\n", "material", "F2/F3 err",
-                "ns", "F1 err", "ns", "F4 size", "err", "ns", std::string(to_string(active_isa())).c_str(),
-                thread_count());
+    tool::Json list = tool::Json::array();
+    for (const Row& row : rows) {
+      list.push_back({{"material", row.material},
+                      {"exact_error", row.exact_float_error},
+                      {"exact_ns", row.exact_ns},
+                      {"schlick_error", row.schlick_error},
+                      {"schlick_ns", row.schlick_ns},
+                      {"table_size", row.table_size ? tool::Json(*row.table_size) : tool::Json(nullptr)},
+                      {"table_error", row.table_error},
+                      {"table_ns", row.table_ns}});
+    }
+    tool::print(
+        {{"isa", isa}, {"threads", thread_count()}, {"max_error", options.max_error}, {"rows", list}});
+    return;
   }
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Row& row = rows[i];
-    const std::string size = row.table_size ? std::to_string(*row.table_size) : (options.json ? "null" : "-");
-    std::printf(
-        options.json
-            ? "%s{\"material\": \"%s\", \"exact_error\": %.3g, \"exact_ns\": %.4g, \"schlick_error\": "
-              "%.3g, \"schlick_ns\": %.4g, \"table_size\": %s, \"table_error\": %.3g, "
-              "\"table_ns\": %.4g}"
-            : "%s%-18s %10.3g %7.3g | %10.3g %7.3g | %7s %10.3g %7.3g\n",
-        options.json && i > 0 ? ", " : "", row.material.c_str(), row.exact_float_error, row.exact_ns,
-        row.schlick_error, row.schlick_ns, size.c_str(), row.table_error, row.table_ns);
+  std::printf("%-18s %10s %7s | %10s %7s | %7s %10s %7s   (%s, %d threads)\n", "material", "F2/F3 err", "ns",
+              "F1 err", "ns", "F4 size", "err", "ns", isa.c_str(), thread_count());
+  for (const Row& row : rows) {
+    const std::string size = row.table_size ? std::to_string(*row.table_size) : "-";
+    std::printf("%-18s %10.3g %7.3g | %10.3g %7.3g | %7s %10.3g %7.3g\n", row.material.c_str(),
+                row.exact_float_error, row.exact_ns, row.schlick_error, row.schlick_ns, size.c_str(),
+                row.table_error, row.table_ns);
   }
-  if (options.json) std::printf("]}\n");
 }
 
 void add_curve_options(CLI::App& command, Options& options) {

@@ -235,26 +235,27 @@ void report(const LayerInference& inference, const std::vector<std::string>& wri
   }
   if (!solve.converged) {
     std::cerr << "mb-infer: warning: not converged after " << solve.iterations
-              << " iterations, the gradient is " << json_number(solve.relative_gradient)
+              << " iterations, the gradient is " << text_of(solve.relative_gradient)
               << " of the first: raise --iterations or --tolerance\n";
   }
   if (!json) {
-    std::cout << "residual " << json_number(solve.rms_error) << ", " << solve.iterations << " iterations, "
+    std::cout << "residual " << text_of(solve.rms_error) << ", " << solve.iterations << " iterations, "
               << (solve.converged ? "converged" : "not converged") << ", " << solve.unknowns
               << " texels seen by " << inference.pixels << " pixels\n";
     return;
   }
-  std::cout << "{\"outputs\": [";
-  for (std::size_t i = 0; i < written.size(); ++i) std::cout << (i ? ", " : "") << json_string(written[i]);
-  std::cout << "], \"maps\": [";
-  for (std::size_t i = 0; i < inference.maps.size(); ++i) {
-    std::cout << (i ? ", " : "") << json_string(inference.maps[i].name);
-  }
-  std::cout << "], \"residual\": " << json_number(solve.rms_error) << ", \"iterations\": " << solve.iterations
-            << ", \"rounds\": " << solve.rounds << ", \"converged\": " << (solve.converged ? "true" : "false")
-            << ", \"relative_gradient\": " << json_number(solve.relative_gradient)
-            << ", \"texels\": " << solve.unknowns << ", \"pixels\": " << inference.pixels
-            << ", \"rejected\": " << inference.rejected << "}\n";
+  Json maps = Json::array();
+  for (const auto& map : inference.maps) maps.push_back(map.name);
+  print({{"outputs", written},
+         {"maps", maps},
+         {"residual", solve.rms_error},
+         {"iterations", solve.iterations},
+         {"rounds", solve.rounds},
+         {"converged", solve.converged},
+         {"relative_gradient", solve.relative_gradient},
+         {"texels", solve.unknowns},
+         {"pixels", inference.pixels},
+         {"rejected", inference.rejected}});
 }
 
 int run(int argc, char** argv) {

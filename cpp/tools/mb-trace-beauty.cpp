@@ -51,15 +51,17 @@ class Beauty final : public Command {
       }
       return;
     }
-    std::cout << "{\"output\": " << json_string(request_.output) << ", \"width\": " << trace.image.width
-              << ", \"height\": " << trace.image.height
-              << ", \"samples_per_pixel\": " << trace.mean_samples_per_pixel << ", \"noise\": ";
+    Json report = {{"output", request_.output},
+                   {"width", trace.image.width},
+                   {"height", trace.image.height},
+                   {"samples_per_pixel", trace.mean_samples_per_pixel},
+                   {"noise", nullptr}};
     if (noise_) {
-      std::cout << trace.noise << ", \"tiles_above_noise\": " << trace.share_above;
-    } else {
-      std::cout << "null";
+      report["noise"] = trace.noise;
+      report["tiles_above_noise"] = trace.share_above;
     }
-    std::cout << ", \"seconds\": " << watch.seconds() << "}\n";
+    report["seconds"] = watch.seconds();
+    print(report);
   }
 
  private:

@@ -48,11 +48,12 @@ class Capture final : public Command {
         save_envmap(request_.output, EnvMapView{map, image.pixels, image.channels}, face_layout, format);
     request_.warn(report);
     if (!json) return;
-    std::cout << "{\"output\": " << json_string(request_.output)
-              << ", \"projection\": " << json_string(to_string(map.projection))
-              << ", \"width\": " << map.width << ", \"height\": " << map.height
-              << ", \"samples_per_pixel\": " << request_.samples << ", \"seconds\": " << watch.seconds()
-              << "}\n";
+    print({{"output", request_.output},
+           {"projection", to_string(map.projection)},
+           {"width", map.width},
+           {"height", map.height},
+           {"samples_per_pixel", request_.samples},
+           {"seconds", watch.seconds()}});
   }
 
  private:

@@ -73,15 +73,17 @@ class Layers final : public Command {
     }
     request_.warn(save_image(request_.output, merge(parts), format));
     if (!json) return;
-    std::cout << "{\"output\": " << json_string(request_.output) << ", \"width\": " << beauty.width
-              << ", \"height\": " << beauty.height << ", \"samples_per_pixel\": " << options.samples_per_pixel
-              << ", \"reflectors\": [";
+    Json reflectors = Json::array();
     for (std::size_t i = 0; i < traces.size(); ++i) {
       const std::string& name = tracer.scene().objects[static_cast<std::size_t>(numbers[i])].name;
-      std::cout << (i ? ", " : "") << "{\"name\": " << json_string(name)
-                << ", \"samples\": " << traces[i].samples.size() << "}";
+      reflectors.push_back({{"name", name}, {"samples", traces[i].samples.size()}});
     }
-    std::cout << "], \"seconds\": " << watch.seconds() << "}\n";
+    print({{"output", request_.output},
+           {"width", beauty.width},
+           {"height", beauty.height},
+           {"samples_per_pixel", options.samples_per_pixel},
+           {"reflectors", reflectors},
+           {"seconds", watch.seconds()}});
   }
 
  private:

@@ -1,14 +1,17 @@
 #pragma once
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <limits>
 #include <new>
+#include <span>
 #include <string>
-#include <string_view>
-#include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/image/image_io.hpp"
@@ -16,35 +19,31 @@
 /// What the programs have in common: values as JSON, and the exit status.
 namespace mirrorbake::tool {
 
-inline std::string json_string(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) {
-      char code[8];
-      std::snprintf(code, sizeof code, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
-      result += code;
-    } else {
-      result += c;
-    }
-  }
-  return result + "\"";
+/// Keys stand in the order in which they are set; numbers that are not finite are null.
+using Json = nlohmann::ordered_json;
+
+/// A float with the digits that tell it from other floats, not those of its double.
+inline double shortest(float value) {
+  if (!std::isfinite(value)) return std::numeric_limits<double>::quiet_NaN();
+  std::array<char, 64> digits{};
+  const char* end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  double result = 0.0;
+  std::from_chars(digits.data(), end, result);
+  return result;
 }
 
-/// Shortest text that reads back as the same number; JSON has no infinity.
-template <typename T>
-std::string json_number(T value) {
-  if (!std::isfinite(static_cast<double>(value))) return "null";
-  char digits[64];
-  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
+inline Json shortest(std::span<const float> values) {
+  Json list = Json::array();
+  for (const float value : values) list.push_back(shortest(value));
+  return list;
 }
 
-template <typename T>
-std::string json_list(const std::vector<T>& values) {
-  std::string result = "[";
-  for (std::size_t i = 0; i < values.size(); ++i) result += (i ? ", " : "") + json_number(values[i]);
-  return result + "]";
+/// In one line; bytes of names that are no UTF-8 become U+FFFD.
+inline std::string line_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
+
+inline void print(const Json& json) { std::cout << line_of(json); }
 
 /// Says on stderr what a file could not hold.
 inline void warn_of_losses(const char* program, const std::string& path, const SaveReport& report) {

@@ -53,33 +53,30 @@ class Proxy:
         """The classic environment map: only the direction counts."""
 
     @staticmethod
+    def sphere(centre: Sequence[float], radius: float, origin: Sequence[float] | None = None) -> Proxy:
+        """A finite sphere: an ellipsoid with three equal radii."""
+
+    @staticmethod
     def box(centre: Sequence[float], half_extent: Sequence[float], origin: Sequence[float] | None = None, axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        A box. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument for
-        unusable values.
+        A box. `origin` has to lie inside; by default it is the centre, or above the floor. Raises InvalidArgument for unusable values.
         """
 
     @staticmethod
     def ellipsoid(centre: Sequence[float], radii: Sequence[float], origin: Sequence[float] | None = None, axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        An ellipsoid. `origin` defaults to its centre and has to lie inside. Raises InvalidArgument
-        for unusable values.
+        An ellipsoid. `origin` has to lie inside; by default it is the centre, or above the floor. Raises InvalidArgument for unusable values.
         """
 
     @staticmethod
-    def sphere(centre: Sequence[float], radius: float, origin: Sequence[float] | None = None) -> Proxy:
-        """A finite sphere: an ellipsoid with three equal radii."""
-
-    @staticmethod
-    def hemisphere(centre: Sequence[float], radius: float, origin: Sequence[float], axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
+    def hemisphere(centre: Sequence[float], radius: float, origin: Sequence[float] | None = None, axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie
-        inside, above the floor.
+        The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie inside; by default it is the centre, or above the floor. Raises InvalidArgument for unusable values.
         """
 
     @property
     def kind(self) -> str:
-        """'infinite', 'box', 'ellipsoid' or 'hemisphere'."""
+        """Name of the shape, which is that of its constructor."""
 
     @property
     def origin(self) -> Sequence[float]:
@@ -89,6 +86,12 @@ class Proxy:
     def centre(self) -> Sequence[float]:
         """
         Centre of the shape (of its floor, for the hemisphere). AttributeError if it is infinite.
+        """
+
+    @property
+    def axes(self) -> NDArray[numpy.float32]:
+        """
+        The shape's own axes in world space, one per row. AttributeError if it is infinite.
         """
 
     @property
@@ -104,12 +107,6 @@ class Proxy:
     @property
     def radius(self) -> float:
         """Radius of the hemisphere. AttributeError for other kinds."""
-
-    @property
-    def axes(self) -> NDArray[numpy.float32]:
-        """
-        The shape's own axes in world space, one per row. AttributeError if it is infinite.
-        """
 
     def lookup(self, positions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], directions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
         """
@@ -165,6 +162,12 @@ class Proxy:
         """Raises InvalidArgument, naming the field, if the proxy is not usable."""
 
     def __repr__(self) -> str: ...
+
+def proxy_shapes() -> dict[str, tuple[str, ...]]:
+    """
+    What tells a shape besides the map's origin, by the name of the shape: attributes of a Proxy, and
+    arguments of the constructor that bears the name.
+    """
 
 def mirror_lookups(proxies: Sequence[Proxy], eye: Sequence[float], positions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)]) -> NDArray[numpy.float32]:
     """
@@ -224,14 +227,17 @@ def fit_box_robust(hits: Annotated[NDArray[numpy.float32], dict(shape=(None, 3),
     `hits` (n, 3). Returns a Proxy with the given origin.
     """
 
+def proxy_families() -> list[str]:
+    """
+    Names of the families of shapes that choose_proxy() fits, in rising order of parameters.
+    """
+
 class ProxyCandidate:
     """A shape that choose_proxy() fitted."""
 
     @property
     def name(self) -> str:
-        """
-        'infinite', 'sphere', 'hemisphere', 'box', 'ellipsoid', 'rotated box' or 'rotated ellipsoid'.
-        """
+        """One of proxy_families()."""
 
     @property
     def parameters(self) -> int:

@@ -30,6 +30,8 @@ from mirrorbake._core import (
 )
 
 __all__ = [
+    "FAMILIES",
+    "SHAPES",
     "Proxy",
     "ProxyCandidate",
     "ProxyChoice",
@@ -74,14 +76,12 @@ def hull_triangles(
     return _core.hull_triangles(positions, triangles, tolerance).astype(np.bool_)
 
 
-SHAPES: Mapping[str, tuple[str, ...]] = {
-    "infinite": (),
-    "box": ("centre", "half_extent", "axes"),
-    "ellipsoid": ("centre", "radii", "axes"),
-    "hemisphere": ("centre", "radius", "axes"),
-}
+SHAPES: Mapping[str, tuple[str, ...]] = _core.proxy_shapes()
 """What tells a shape besides the map's origin: attributes of a `Proxy`, and arguments of the constructor that
 bears the shape's name."""
+
+FAMILIES: tuple[str, ...] = tuple(_core.proxy_families())
+"""What `choose_proxy` fits, in rising order of parameters."""
 
 
 def proxy_from_attributes(description: Mapping[str, Any]) -> _core.Proxy:

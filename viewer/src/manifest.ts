@@ -2,18 +2,10 @@
 
 import type { RadianceCode } from "./atlas";
 import { UserError } from "./errors";
+import { isVector } from "./math";
+import { isProxy, type ProxyShape } from "./proxy";
 
 export type Vec3 = [number, number, number];
-
-export interface ProxyShape {
-  shape: "infinite" | "box" | "ellipsoid" | "hemisphere";
-  origin: Vec3;
-  centre?: Vec3;
-  axes?: [Vec3, Vec3, Vec3];
-  half_extent?: Vec3;
-  radii?: Vec3;
-  radius?: number;
-}
 
 export type Projection = "cube" | "paraboloid";
 
@@ -172,10 +164,6 @@ function isSize(n: unknown): n is number {
   return typeof n === "number" && n >= 1 && n <= 4096 && Number.isInteger(Math.log2(n));
 }
 
-function isVector(v: unknown): v is Vec3 {
-  return Array.isArray(v) && v.length === 3 && v.every(Number.isFinite);
-}
-
 function isName(name: unknown): name is string {
   return (
     typeof name === "string" &&
@@ -186,16 +174,7 @@ function isName(name: unknown): name is string {
 }
 
 function checkProxy(proxy: ProxyShape, where: string): void {
-  const number = (x: unknown) => typeof x === "number" && Number.isFinite(x) && x > 0;
-  const positive = (v: unknown) => isVector(v) && v.every(number);
-  const placed = isVector(proxy?.centre) && Array.isArray(proxy.axes) && proxy.axes.every(isVector);
-  const valid =
-    isVector(proxy?.origin) &&
-    (proxy.shape === "infinite" ||
-      (placed && proxy.shape === "box" && positive(proxy.half_extent)) ||
-      (placed && proxy.shape === "ellipsoid" && positive(proxy.radii)) ||
-      (placed && proxy.shape === "hemisphere" && number(proxy.radius)));
-  if (!valid) damaged(`the geometry of ${where} is not one that this page knows`);
+  if (!isProxy(proxy)) damaged(`the geometry of ${where} is not one that this page knows`);
 }
 
 function checkAxes(data: Manifest): void {

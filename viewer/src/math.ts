@@ -9,6 +9,9 @@ export const cross = (a: Vec3, b: Vec3): Vec3 => [
   a[2] * b[0] - a[0] * b[2],
   a[0] * b[1] - a[1] * b[0],
 ];
+export function isVector(v: unknown): v is Vec3 {
+  return Array.isArray(v) && v.length === 3 && v.every(Number.isFinite);
+}
 export const normalize = (a: Vec3): Vec3 => scale(1 / Math.hypot(...a), a);
 export const clamp = (x: number, low: number, high: number): number => Math.min(Math.max(x, low), high);
 

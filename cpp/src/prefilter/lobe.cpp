@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/text.hpp"
@@ -65,6 +66,19 @@ LobeDerivatives from_table(const Lobe& lobe, double sine_of_half) {
 }
 
 }  // namespace
+
+Lobe make_lobe(LobeKind kind, double parameter, std::vector<double> table) {
+  Lobe lobe{kind};
+  switch (kind) {
+    case LobeKind::lambert: break;
+    case LobeKind::phong: lobe.exponent = parameter; break;
+    case LobeKind::ggx: lobe.alpha = parameter; break;
+    case LobeKind::table: lobe.table_angle = parameter; break;
+  }
+  lobe.table = std::move(table);
+  validate(lobe);
+  return lobe;
+}
 
 void validate(const Lobe& lobe) {
   switch (lobe.kind) {

@@ -289,6 +289,12 @@ double off_view_error(const Family& family, const Selection& selection, const Pa
 
 }  // namespace
 
+std::vector<std::string> proxy_families() {
+  std::vector<std::string> names;
+  for (const Family& family : kFamilies) names.emplace_back(family.name);
+  return names;
+}
+
 ProxyChoice choose_proxy(const TracedRays& rays, glm::vec3 origin, const ProxyChoiceOptions& options) {
   check(rays, origin, options);
   const Selection selection = select(rays, origin, options);

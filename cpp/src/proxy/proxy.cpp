@@ -72,6 +72,7 @@ void set_shape(LookupConstants& k, const Shape& shape) {
   set(k.extent, size);
 }
 
+/// The lengths of an extent, of either type.
 std::span<float> numbers_of(float& extent) { return {&extent, 1}; }
 std::span<float> numbers_of(glm::vec3& extent) { return {&extent.x, 3}; }
 
@@ -138,8 +139,7 @@ std::vector<float> extents_of(const Proxy& proxy) {
   std::visit(
       [&]<typename Shape>(Shape shape) {
         for_each_extent<Shape>([&](const auto& extent) {
-          const std::span<float> own = numbers_of(shape.*(extent.member));
-          numbers.insert(numbers.end(), own.begin(), own.end());
+          for (const float number : numbers_of(shape.*(extent.member))) numbers.push_back(number);
         });
       },
       proxy.shape);

@@ -93,8 +93,8 @@ class CausticGuide {
   /// Of the cells' lit bins, one cell after the other.
   std::vector<std::uint32_t> first_;  ///< per cell with rays, + 1
   std::vector<std::uint16_t> bins_;
-  std::vector<float>
-      cdf_;  ///< before each bin; a cell's begins with 0 and ends with 1, an entry more than bins
+  /// Before each bin; a cell's begins with 0 and ends with 1, an entry more than bins
+  std::vector<float> cdf_;
 };
 
 }  // namespace mirrorbake::tracing

@@ -19,8 +19,8 @@ struct LightSample {
   glm::vec3 direction{0.0F};  ///< unit
   float distance = 0.0F;      ///< +inf for the environment
   glm::vec3 radiance{0.0F};  ///< divided by the density: a sum over samples times the cosine gives irradiance
-  float pdf =
-      0.0F;  ///< density per solid angle of this direction; 0 if rays that are followed cannot find the light
+  /// Density per solid angle of this direction; 0 if rays that are followed cannot find the light
+  float pdf = 0.0F;
 };
 
 /// How many directions next-event estimation takes at a surface. `one` picks a light by what it may bring

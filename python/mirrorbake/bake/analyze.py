@@ -23,7 +23,7 @@ from mirrorbake.bake.quality import QUALITIES, quality_decisions
 from mirrorbake.bake.shell_shapes import planned_shells
 from mirrorbake.bake.split_shells import shells_decision
 from mirrorbake.bake.worth import advice_of, shared_distant
-from mirrorbake.proxy import hull_triangles, proxy_to_attributes
+from mirrorbake.proxy import proxy_to_attributes
 from mirrorbake.scene.config_shells import DEFAULT_SHELLS, ITSELF
 from mirrorbake.scene.plan import Decision, Plan
 
@@ -80,7 +80,7 @@ def analyze(stage: Stage) -> Plan:
         stage = replace(stage, config=stage.config.model_copy(update={"shells": found}))
         probe = Probe.of(stage, cast("int", depth.value))
     distant, proxy = distant_decision(stage, probe)
-    on_hull = hull_triangles(stage.built.positions, stage.built.triangles)[probe.triangle]
+    on_hull = stage.built.on_hull[probe.triangle]
     local = _local(stage, probe, on_hull)
     samples = _samples(stage, cast("int", depth.value))
     size = _map_size(stage, proxy)

@@ -16,7 +16,7 @@ from mirrorbake.pem.pyramid import capture
 from mirrorbake.pem.run_time import TRACED_SAMPLES
 from mirrorbake.pem.shells import Part, Shell
 from mirrorbake.pem.store import Contents
-from mirrorbake.proxy import hull_triangles, proxy_to_attributes
+from mirrorbake.proxy import proxy_to_attributes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -74,7 +74,7 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
     )
     local_triangles = None
     if plan.has_hull_split:
-        local_triangles = (~hull_triangles(built.positions, built.triangles)).astype(np.uint8)
+        local_triangles = (~built.on_hull).astype(np.uint8)
     return Contents(header, captured, irradiance, local_triangles, lit_sides=sides)
 
 

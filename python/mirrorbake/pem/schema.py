@@ -32,22 +32,27 @@ class _Model(BaseModel):
 class ProxyAttributes(_Model):
     """A shape, as `mirrorbake.proxy.proxy_to_attributes` returns it."""
 
+    model_config = ConfigDict(extra="allow")
+
     shape: str
     origin: Triple
-    centre: Triple | None = None
-    half_extent: Triple | None = None
-    radii: Triple | None = None
-    radius: Number | None = None
     axes: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
+    __pydantic_extra__: dict[str, Number | Triple] = Field(init=False)
+    """Its centre and extents."""
 
     @model_validator(mode="after")
     def _is_a_shape(self) -> ProxyAttributes:
         if self.shape not in SHAPES:
             raise ValueError(f"no such shape: {self.shape}; expected {', '.join(SHAPES)}")
+        description = self.model_dump(exclude_none=True)
+        for key in description.keys() - {"shape", "origin", *SHAPES[self.shape]}:
+            raise ValueError(f"a {self.shape} has no {key!r}")
         try:
-            proxy_from_attributes(self.model_dump(exclude_none=True))
+            proxy_from_attributes(description)
         except KeyError as missing:
             raise ValueError(f"a {self.shape} needs {missing}") from None
+        except TypeError:
+            raise ValueError(f"an extent of the {self.shape} is of another kind") from None
         return self
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.errors import InputError
+from mirrorbake.proxy import hull_triangles
 from mirrorbake.scene.cameras import Cameras, resolve_cameras
 from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.origin import Origin, loaded_nearby
@@ -45,6 +47,11 @@ class BuiltScene:
     space: ParameterSpace
     notes: list[str]
     """What the user should know about the inputs, such as values that had to be changed."""
+
+    @cached_property
+    def on_hull(self) -> NDArray[np.bool_]:
+        """(T,) which triangles lie on the reflector's convex hull and cannot reflect it ([PEM] §4)."""
+        return hull_triangles(self.positions, self.triangles)
 
 
 def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from mirrorbake import _core
+from mirrorbake.proxy import FAMILIES
 from mirrorbake.scene.config_axes import SCENE_AXES, Light, Motion, scene_axes
 from mirrorbake.scene.config_shells import Shells, ShellSection, check_shells
 from mirrorbake.scene.config_values import (
@@ -23,6 +24,7 @@ from mirrorbake.scene.config_values import (
     Section,
     Vec3,
     as_tuple,
+    one_of,
     with_default,
 )
 from mirrorbake.scene.config_views import Elevation, Views
@@ -200,9 +202,7 @@ class Layers(Section):
     "auto": if a view sees any."""
 
 
-DistantShape: TypeAlias = Literal[
-    "infinite", "sphere", "hemisphere", "box", "ellipsoid", "rotated box", "rotated ellipsoid"
-]
+DistantShape: TypeAlias = Annotated[str, one_of(*FAMILIES)]
 """What `choose_proxy` fits."""
 
 

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
 from mirrorbake import _core
-from mirrorbake.scene.config_values import Section, as_tuple
+from mirrorbake.proxy import FAMILIES
+from mirrorbake.scene.config_values import Section, as_tuple, one_of
 
 ITSELF = "itself"
 """Name of the reflector among the objects of a shell."""
 
-ShellShape: TypeAlias = Literal[
-    "auto",
-    "infinite",
-    "plane",
-    "sphere",
-    "hemisphere",
-    "box",
-    "ellipsoid",
-    "rotated box",
-    "rotated ellipsoid",
-]
+ShellShape: TypeAlias = Annotated[str, one_of("auto", "plane", *FAMILIES)]
 """Geometry of a shell; "auto" fits what its rays meet, and an ellipsoid about each part for `itself`."""
 
 

@@ -75,6 +75,17 @@ ImageSide: TypeAlias = Annotated[int, Field(ge=1, le=MAX_IMAGE_SIDE)]
 MapSize: TypeAlias = Annotated[int, Field(ge=1, le=MAX_MAP_SIZE), AfterValidator(_power_of_two)]
 
 
+def one_of(*names: str) -> AfterValidator:
+    """Return the check that a text is one of several names, which come from a table."""
+
+    def check(value: str) -> str:
+        if value not in names:
+            raise ValueError(f"Input should be {', '.join(map(repr, names[:-1]))} or {names[-1]!r}")
+        return value
+
+    return AfterValidator(check)
+
+
 def with_default(data: Any, keys: tuple[str, ...], value: str) -> Any:
     """Return a section with a value for the first of several keys, where none of them is given."""
     if isinstance(data, Mapping) and all(data.get(key) is None for key in keys):

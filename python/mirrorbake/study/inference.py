@@ -11,7 +11,6 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.evaluate.metrics import psnr
-from mirrorbake.proxy import hull_triangles
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -100,7 +99,7 @@ class Lab:
         seen = trace.samples
         hits = seen.position + np.array(seen.origin) + np.asarray(seen.reflection) * distance[:, None]
         far = _core.fit_box_robust(hits[np.isfinite(distance)].astype(np.float32), origin)
-        off_hull = (~hull_triangles(built.positions, built.triangles)).astype(np.uint8)
+        off_hull = (~built.on_hull).astype(np.uint8)
         parts: list[list[tuple[_core.Proxy, int, np.ndarray | None]]] = []
         for number in range(len(built.part_names)):
             triangles = built.triangles[built.parts == number]

@@ -6,9 +6,11 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -443,6 +445,31 @@ TEST(Lookup, MirrorsInSeveralProxiesAreThoseInEach) {
       }
     }
   }
+}
+
+TEST(ProxyShapes, ComeBackFromTheirNamesAndNumbers) {
+  std::mt19937 random(7);
+  const glm::mat3 axes = random_rotation(random);
+  const Proxy shapes[] = {{InfiniteSphere{}, glm::vec3(0)},
+                          {Box{{1, 2, 3}, {0.5F, 4, 6}, axes}, {1, 2, 3}},
+                          {Ellipsoid{{1, 2, 3}, {0.5F, 4, 6}, axes}, {1, 2, 3}},
+                          {Hemisphere{{1, 2, 3}, 2, axes}, glm::vec3(1, 2, 3) + glm::transpose(axes)[1]}};
+  ASSERT_EQ(std::size(shapes), std::variant_size_v<decltype(Proxy::shape)>);
+  const glm::vec3 position(1.1F, 2.1F, 3.1F);
+  const glm::vec3 direction(0.3F, 1, -0.2F);
+  for (const Proxy& shape : shapes) {
+    const std::optional<Proxy> again =
+        proxy_from_numbers(shape_name(shape), {1, 2, 3}, extents_of(shape), axes);
+    ASSERT_TRUE(again) << shape_name(shape);
+    EXPECT_NO_THROW(validate(*again));
+    EXPECT_EQ(again->shape.index(), shape.shape.index());
+    EXPECT_EQ(again->origin, shape.origin) << shape_name(shape);
+    EXPECT_EQ(lookup_direction(*again, position, direction), lookup_direction(shape, position, direction));
+    std::vector<float> more = extents_of(shape);
+    more.push_back(1.0F);
+    EXPECT_FALSE(proxy_from_numbers(shape_name(shape), {1, 2, 3}, more)) << shape_name(shape);
+  }
+  EXPECT_FALSE(proxy_from_numbers("cone", {}, {}));
 }
 
 TEST(ProxyValidation, NamesTheFieldThatIsUnusable) {

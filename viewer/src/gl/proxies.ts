@@ -1,7 +1,6 @@
-import type { ProxyShape, Vec3 } from "../manifest";
+import type { Vec3 } from "../manifest";
+import { isScaled, type ProxyShape, shapeNumber, sizeOf } from "../proxy";
 import type { Program } from "./program";
-
-const SHAPES: { [name: string]: number } = { infinite: 0, box: 1, ellipsoid: 2, hemisphere: 3 };
 
 /// Where the object has moved to: turned about the vertical through `pivot`, then moved by `offset`.
 export interface Motion {
@@ -16,7 +15,7 @@ export class Proxies {
   private readonly shape: Int32Array;
   private readonly centre: Float32Array;
   private readonly proxyFromWorld: Float32Array;
-  private readonly halfExtent: Float32Array;
+  private readonly size: Float32Array;
   private readonly origin: Float32Array;
 
   /// `moves` says which proxies move.
@@ -25,13 +24,13 @@ export class Proxies {
     private readonly moves: boolean[],
   ) {
     const count = proxies.length;
-    this.shape = Int32Array.from(proxies, (proxy) => SHAPES[proxy.shape]);
+    this.shape = Int32Array.from(proxies, shapeNumber);
     this.centre = new Float32Array(3 * count);
     this.proxyFromWorld = new Float32Array(9 * count);
-    this.halfExtent = new Float32Array(3 * count).fill(1);
+    this.size = new Float32Array(3 * count);
     this.origin = new Float32Array(3 * count);
     proxies.forEach((proxy, i) => {
-      this.halfExtent.set(proxy.half_extent ?? [1, 1, 1], 3 * i);
+      this.size.set(sizeOf(proxy), 3 * i);
       this.place(i, STILL);
     });
   }
@@ -44,7 +43,7 @@ export class Proxies {
     gl.uniform1iv(program.at("uShape"), this.shape);
     gl.uniform3fv(program.at("uCentre"), this.centre);
     gl.uniformMatrix3fv(program.at("uProxyFromWorld"), false, this.proxyFromWorld);
-    gl.uniform3fv(program.at("uHalfExtent"), this.halfExtent);
+    gl.uniform3fv(program.at("uShapeSize"), this.size);
     gl.uniform3fv(program.at("uOrigin"), this.origin);
   }
 
@@ -59,14 +58,14 @@ export class Proxies {
     };
     point(this.origin, proxy.origin);
     point(this.centre, proxy.centre ?? ORIGIN);
-    const radii = proxy.radii ?? (proxy.radius ? [proxy.radius, proxy.radius, proxy.radius] : ONES);
+    const unit = isScaled(proxy) ? sizeOf(proxy) : ONES;
     const axes = proxy.axes ?? AXES;
     for (let row = 0; row < 3; ++row) {
       const [x, y, z] = axes[row];
       const at = 9 * i + row;
-      this.proxyFromWorld[at] = (cosine * x + sine * z) / radii[row];
-      this.proxyFromWorld[at + 3] = y / radii[row];
-      this.proxyFromWorld[at + 6] = (cosine * z - sine * x) / radii[row];
+      this.proxyFromWorld[at] = (cosine * x + sine * z) / unit[row];
+      this.proxyFromWorld[at + 3] = y / unit[row];
+      this.proxyFromWorld[at + 6] = (cosine * z - sine * x) / unit[row];
     }
   }
 }

@@ -2,6 +2,7 @@
 /// (mirrorbake/envmap/reads.hpp, mirrorbake/surface/lookup.hpp): drivers' own levels and anisotropy differ between cards.
 
 import type { Projection } from "../manifest";
+import { EXITS } from "../proxy";
 
 export const HEADER = `#version 300 es
 precision highp float;
@@ -214,43 +215,6 @@ float readAlpha(vec3 d, float level, float size, float layer) {
 }
 `;
 
-const EXITS = `
-// Where a ray leaves a proxy: mirrorbake/proxy/lookup_formulas.hpp.
-float boxExit(vec3 p, vec3 d, vec3 extent) {
-  float t = 1e37;
-  for (int i = 0; i < 3; ++i) {
-    float speed = abs(d[i]);
-    float side = d[i] < 0.0 ? -extent[i] : extent[i];
-    if (speed > 0.0) t = min(t, abs(side - p[i]) / speed);
-  }
-  return t < 1e36 ? t : 0.0;
-}
-
-float sphereExit(vec3 p, vec3 d) {
-  float a = dot(d, d);
-  float b = dot(p, d);
-  float c = dot(p, p) - 1.0;
-  float s = sqrt(max(b * b - a * c, 0.0));
-  float t = b > 0.0 ? -c / (b + s) : (s - b) / a;
-  return t > 0.0 ? t : 0.0;
-}
-
-// Of a shape: 0 infinite, 1 box, 2 ellipsoid, 3 hemisphere.
-vec3 leave(int shape, vec3 p, vec3 d, vec3 centre, mat3 proxyFromWorld, vec3 halfExtent, vec3 origin) {
-  if (shape == 0) return d;
-  vec3 q = proxyFromWorld * (p - centre);
-  vec3 e = proxyFromWorld * d;
-  float t;
-  if (shape == 1) {
-    t = boxExit(q, e, halfExtent);
-  } else {
-    t = sphereExit(q, e);
-    if (shape == 3 && e.y < 0.0) t = min(t, abs(q.y / e.y));
-  }
-  return p + t * d - origin;
-}
-`;
-
 /// `shells` of the part and the number of samples that are `mixed`, the static set among them, are constants of the program.
 export function meshFragment(shells: number, mixed: number, projection: Projection): string {
   return `${mapHeader(projection)}
@@ -278,7 +242,7 @@ uniform bool uFlat;
 uniform int uShape[SHELLS + 1];
 uniform vec3 uCentre[SHELLS + 1];
 uniform mat3 uProxyFromWorld[SHELLS + 1];  // scaled, but for boxes
-uniform vec3 uHalfExtent[SHELLS + 1];
+uniform vec3 uShapeSize[SHELLS + 1];
 uniform vec3 uOrigin[SHELLS + 1];
 uniform float uSize[SHELLS + 1];
 uniform float uShellOn[SHELLS];  // 0: not drawn, or not on these triangles
@@ -308,7 +272,7 @@ uniform mat3x2 uNormalFromUv;
 ${EXITS}
 vec3 lookupDirection(int shell, vec3 p, vec3 d) {
   return leave(
-    uShape[shell], p, d, uCentre[shell], uProxyFromWorld[shell], uHalfExtent[shell], uOrigin[shell]
+    uShape[shell], p, d, uCentre[shell], uProxyFromWorld[shell], uShapeSize[shell], uOrigin[shell]
   );
 }
 
@@ -519,7 +483,7 @@ uniform vec3 uEye;
 uniform int uShape;
 uniform vec3 uCentre;
 uniform mat3 uProxyFromWorld;
-uniform vec3 uHalfExtent;
+uniform vec3 uShapeSize;
 uniform vec3 uOrigin;
 ${EXITS}
 uniform vec4 uPlain;  // a: 1: this colour instead of the surroundings
@@ -530,9 +494,9 @@ void main() {
   }
   vec2 pixel = vec2(gl_FragCoord.x, uPixels.y - gl_FragCoord.y) - 0.5 + uPlace;
   vec3 d = uMiddle + (pixel.x - 0.5 * uPixels.x) * uRight + (pixel.y - 0.5 * uPixels.y) * uDown;
-  vec3 h = leave(uShape, uEye, d, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);
-  vec3 hx = leave(uShape, uEye, d + uRight, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);
-  vec3 hy = leave(uShape, uEye, d + uDown, uCentre, uProxyFromWorld, uHalfExtent, uOrigin);
+  vec3 h = leave(uShape, uEye, d, uCentre, uProxyFromWorld, uShapeSize, uOrigin);
+  vec3 hx = leave(uShape, uEye, d + uRight, uCentre, uProxyFromWorld, uShapeSize, uOrigin);
+  vec3 hy = leave(uShape, uEye, d + uDown, uCentre, uProxyFromWorld, uShapeSize, uOrigin);
   Taps taps = tapsOf(h, hx - h, hy - h, uSize);
   oColour = vec4(readRadiance(h, taps.level, uSize, uStaticLayer), 0.0);
 }

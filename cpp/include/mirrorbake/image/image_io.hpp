@@ -33,16 +33,15 @@ struct EnumNames<PixelFormat> {
 };
 
 struct SaveReport {
-  std::uint64_t clamped_to_half =
-      0;                      ///< values beyond ±65504 that were clamped because the file stores float16
-  std::uint64_t clipped = 0;  ///< values outside [0,1], or below 0 in HDR, or NaN there, that were clipped
+  std::uint64_t clamped_to_half = 0;  ///< values beyond ±65504 in a file of float16
+  std::uint64_t clipped = 0;          ///< values outside [0,1], or below 0 in HDR, or NaN there
 };
 
 /// Which pixels of an EXR file that has several sets of them. Other files have one, of which both are empty.
 struct ImageChoice {
   std::string part;  ///< name or number from 0 of a part; empty: the first with colours, or else the first
-  std::string
-      layer;  ///< its channels, without its name and the dot before them; empty: all channels of the part
+  /// Its channels, without its name and the dot before them; empty: all channels of the part
+  std::string layer;
 };
 
 /// Reads a file as scene-linear float32 of Rec. 709 primaries. What kind of file it is follows from its first

@@ -18,8 +18,8 @@ namespace mirrorbake {
 struct FitShell {
   Proxy proxy;
   int map = 0;  ///< number of its map
-  std::span<const std::uint8_t> triangles =
-      {};  ///< 0 for those that the shell leaves out; empty: it covers all
+  /// 0 for those that the shell leaves out; empty: it covers all
+  std::span<const std::uint8_t> triangles = {};
 };
 
 /// Front to back, in the order of the targets' stack of the part; the last is opaque, and holds what arrives

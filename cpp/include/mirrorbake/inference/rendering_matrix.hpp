@@ -22,8 +22,8 @@ struct SampleSelection {
       : part(part_number), triangles(chosen_triangles) {}
 
   int part = 0;
-  std::span<const std::uint8_t>
-      triangles;  ///< one entry per triangle of the reflector, 0: not chosen; empty: all
+  /// One entry per triangle of the reflector, 0: not chosen; empty: all
+  std::span<const std::uint8_t> triangles;
 };
 
 /// Sparse matrix in rows (CSR). One row per pixel that sees the selection, holding the mean of its samples'

@@ -32,6 +32,10 @@ struct Lobe {
   double table_angle = 180.0;  ///< degrees, above 0 and up to 180
 };
 
+/// `parameter` is the exponent of `phong`, α of `ggx` and the angle of `table`. Throws InvalidArgument as
+/// validate.
+Lobe make_lobe(LobeKind kind, double parameter, std::vector<double> table = {});
+
 /// Throws InvalidArgument for an exponent, alpha or table outside of these ranges, or a table that is all 0.
 void validate(const Lobe& lobe);
 

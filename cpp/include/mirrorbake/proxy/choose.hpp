@@ -30,9 +30,11 @@ struct ProxyChoiceOptions {
   std::size_t max_rays_per_view = 1000;
 };
 
+/// Names of the families of shapes that are fitted, in rising order of parameters.
+std::vector<std::string> proxy_families();
+
 struct ProxyCandidate {
-  std::string
-      name;  ///< "infinite", "sphere", "hemisphere", "box", "ellipsoid", "rotated box", "rotated ellipsoid"
+  std::string name;    ///< of its family
   int parameters = 0;  ///< numbers that the fit sets
   Proxy proxy;         ///< fitted to all views
   /// Mean angle, as seen from the map's origin, between the lookup and the point that the ray really meets,

@@ -63,7 +63,7 @@ struct InfiniteSphere {};
 template <>
 struct ShapeTraits<InfiniteSphere> {
   static constexpr const char* name = "infinite";
-  static constexpr std::tuple<> extents;
+  static constexpr std::tuple<> extents = {};
 };
 
 /// A box with its own axes; `proxy_from_world` rotates world directions into them (identity: axis-aligned).

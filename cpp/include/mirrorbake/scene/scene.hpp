@@ -24,8 +24,8 @@ struct TriangleMesh {
   std::vector<glm::vec2> uvs;         ///< one per vertex, v up; empty: (0,0)
   std::vector<glm::uvec3> triangles;  ///< counter-clockwise seen from outside
   std::vector<std::uint16_t> parts;   ///< part of each triangle; empty: all belong to part 0
-  std::vector<glm::vec3> colors =
-      {};  ///< one per vertex, in [0,1], linear, multiply the albedo; empty: (1,1,1)
+  /// One per vertex, in [0,1], linear, multiply the albedo; empty: (1,1,1)
+  std::vector<glm::vec3> colors = {};
 };
 
 /// Texels that materials refer to: in memory, or in a file.
@@ -100,8 +100,8 @@ struct Material {
   TextureReference emission_texture;  ///< multiplies `emission`
   float opacity = 1.0F;               ///< part of the surface that is there, in [0,1]: rays pass between
   TextureReference opacity_texture;   ///< its first channel multiplies `opacity`; its texels are in memory
-  std::optional<float>
-      opacity_cutoff;  ///< all is there where the opacity is at least this, nothing elsewhere
+  /// All is there where the opacity is at least this, nothing elsewhere
+  std::optional<float> opacity_cutoff;
   /// Bends the shading normal as glTF 2.0 §3.9.3 has it: texels (x, y, z)/2 + 1/2 in the frame of ∂p/∂u,
   /// ∂p/∂v, both of the mesh's coordinates with v up, and the normal.
   TextureReference normal_texture;

@@ -163,7 +163,7 @@ class Tracer {
   Image trace_geometry(const Camera& camera, const TraceOptions& options) const;
 
   /// Layers of the object number `reflector`, whose material must be specular. Throws InvalidArgument for an
-  /// eye inside it: in its bounding box, most directions meeting the back of its surface first.
+  /// eye that it encloses().
   LayerTrace trace_layers(const Camera& camera, int reflector, const TraceOptions& options) const;
 
   /// The same for several reflectors, all different, which share the rays from the eye: one LayerTrace each,

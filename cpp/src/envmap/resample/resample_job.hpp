@@ -21,8 +21,8 @@ struct ResampleJob {
   ResampleFilter filter;
   glm::dmat3 source_from_target;
   TexelDensity density;
-  std::vector<double>
-      weights;  ///< solid angles of the source's rows, if they do not differ in a row, or texels
+  /// Solid angles of the source's rows, if they do not differ in a row, or texels
+  std::vector<double> weights;
 
   int width() const { return source.width; }
   int height() const { return source.height; }

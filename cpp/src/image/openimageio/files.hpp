@@ -32,8 +32,8 @@ class GuardedBytes : public OIIO::Filesystem::IOProxy {
 
 /// An open file. The bytes outlive their reader.
 struct OpenInput {
-  std::vector<unsigned char>
-      memory;  ///< of JPEG files: their reader accepts no other proxy than one of memory
+  /// Of JPEG files: their reader accepts no other proxy than one of memory
+  std::vector<unsigned char> memory;
   std::unique_ptr<OIIO::Filesystem::IOProxy> bytes;
   std::unique_ptr<OIIO::ImageInput> input;
   OIIO::ImageInput* operator->() const { return input.get(); }

@@ -59,19 +59,22 @@ class Proxy:
     @staticmethod
     def box(centre: Sequence[float], half_extent: Sequence[float], origin: Sequence[float] | None = None, axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        A box. `origin` has to lie inside; by default it is the centre, or above the floor. Raises InvalidArgument for unusable values.
+        A box. `origin` has to lie inside (default: the
+        centre, or above it where that is on a wall). Raises InvalidArgument for unusable values.
         """
 
     @staticmethod
     def ellipsoid(centre: Sequence[float], radii: Sequence[float], origin: Sequence[float] | None = None, axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        An ellipsoid. `origin` has to lie inside; by default it is the centre, or above the floor. Raises InvalidArgument for unusable values.
+        An ellipsoid. `origin` has to lie inside (default: the
+        centre, or above it where that is on a wall). Raises InvalidArgument for unusable values.
         """
 
     @staticmethod
     def hemisphere(centre: Sequence[float], radius: float, origin: Sequence[float] | None = None, axes: Annotated[NDArray[numpy.float32], dict(shape=(3, 3), order='C', device='cpu', writable=False)] | None = None) -> Proxy:
         """
-        The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie inside; by default it is the centre, or above the floor. Raises InvalidArgument for unusable values.
+        The half of a sphere above its own y = 0, closed by a flat floor. `origin` has to lie inside (default: the
+        centre, or above it where that is on a wall). Raises InvalidArgument for unusable values.
         """
 
     @property

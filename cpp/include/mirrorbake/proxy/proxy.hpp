@@ -51,7 +51,7 @@ struct ShapeExtent {
 /// `proxy_from_world`, and
 ///
 ///  - `extents`, a tuple of ShapeExtent; in files and in Python they have these names,
-///  - `size`, lengths along the axes, in units of which `gauge` of a point seen from the centre is below 1 inside,
+///  - `size`, lengths along the axes; `gauge` of a point from the centre, in their units, is below 1 inside,
 ///  - `inside`, a point clearly inside, along the axes and seen from the centre: the origin of maps, if none
 ///    is given.
 template <typename Shape>

@@ -101,8 +101,8 @@ def test_tool_reports_errors_and_metals_as_json(tool: str) -> None:
     assert len(report["rows"]) == 18
     for row in report["rows"]:
         assert row["exact_error"] < 4e-7
-        # The table's own search for its largest error is coarser than the report's: where total reflection sets
-        # in, with a vertical tangent, that finds 0.13 % more.
+        # The table's own search for its largest error is coarser than the report's: where total reflection
+        # sets in, with a vertical tangent, that finds 0.13 % more.
         assert row["table_size"] is None or row["table_error"] <= 1.002e-2
     metal = json.loads(run(tool, "metal", "Cu", "--json").stdout)
     np.testing.assert_allclose(metal["normal_incidence"], fresnel.metal_colour("copper").normal, rtol=1e-5)

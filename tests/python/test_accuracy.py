@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from mirrorbake.study.accuracy import Accuracy, accuracy
+from mirrorbake.study.accuracy import accuracy
+from mirrorbake.study.accuracy_row import Accuracy
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reference" / "accuracy.md").read_text(encoding="utf-8")
 ROWS = accuracy(cosines=24, rays=3)

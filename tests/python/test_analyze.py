@@ -10,19 +10,15 @@ import numpy as np
 import pytest
 
 from mirrorbake import _core
-from mirrorbake.bake.analyze import (
-    LARGEST_MAP,
-    MAX_DEPTH,
-    MIRROR_SAMPLES,
-    MOST_SAMPLES,
-    SMALLEST_MAP,
-    analyze,
-)
+from mirrorbake.bake.analyze import MAX_DEPTH, MIRROR_SAMPLES, MOST_SAMPLES, analyze
 from mirrorbake.bake.bake import bake
 from mirrorbake.bake.count_parts import disagreement
+from mirrorbake.bake.local_shapes import BETTER, WORTH
+from mirrorbake.bake.map_sizes import LARGEST_MAP, SMALLEST_MAP
 from mirrorbake.bake.probe import Probe, displayed_noise
 from mirrorbake.errors import InputError
 from mirrorbake.pem.opened import open_pem
+from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.scene.surface_parts import split_surface
@@ -138,6 +134,62 @@ def test_a_flat_mirror_asks_for_no_more_than_the_largest_map(tmp_path: Path) -> 
     assert str(LARGEST_MAP) in of(plan, "maps.size").reason
 
 
+def box_and_ball(folder: Path) -> Stage:
+    """Prepare a mirror of two parts: a flat one, and a small ball on it that sees itself in it."""
+    path = folder / "two.obj"
+    ball = _core.make_sphere((0, 1.1, 0), 0.1, 32)
+    lines = []
+    for name, mesh, first in (("flat", CONVEX, 1), ("round", ball, 1 + len(CONVEX.positions))):
+        lines += [f"o {name}", *("v {:g} {:g} {:g}".format(*p) for p in mesh.positions)]
+        lines += ["f {} {} {}".format(*(first + corners)) for corners in mesh.triangles.astype(int)]
+    path.write_text("\n".join(lines) + "\n")
+    stage = make_stage(folder, CONVEX)
+    data = stage.config.model_dump(mode="json", exclude_unset=True)
+    data["reflector"] = {"mesh": str(path), "height": 1.2, "parts": "split"}
+    # With a material of the scene file an OBJ file is one part; this one has none, so that it is a mirror.
+    del data["material"]
+    return prepare_stage(parse_config(data, "scene"))
+
+
+def test_a_flat_part_gets_larger_maps_than_a_small_ball(tmp_path: Path) -> None:
+    stage = box_and_ball(tmp_path)
+    plan = analyze(stage)
+    flat, ball = stage.built.part_names
+    assert plan.size_of(flat, "distant") > plan.size_of(ball, "distant")
+    assert plan.map_size == max(d.value for d in plan.decisions if d.key == "maps.size")
+    bake(stage.config, tmp_path / "pem", stage=stage)
+    header, sizes = PemStore.open(tmp_path / "pem").header, set[int]()
+    for part in header.parts:
+        for shell in part.shells:
+            assert shell.size == plan.size_of(part.name, shell.name)
+            sizes.add(shell.size)
+    assert len(sizes) > 1
+    assert [entry.size for entry in header.maps] == [
+        plan.size_of(*entry.name.split("/")) for entry in header.maps
+    ]
+
+
+def test_what_a_part_sees_of_the_object_decides_its_shape(tmp_path: Path) -> None:
+    plan = analyze(make_stage(tmp_path, RING))
+    shapes = [decision for decision in plan.decisions if decision.key == "shells.proxy"]
+    assert {(shape.part, shape.shell) for shape in shapes} == {
+        (part, "local") for part in plan.shells[0].proxies
+    }
+    for shape in shapes:
+        assert shape.automatic
+        assert shape.measured is not None
+        # The best of the others is named beside it; small differences are not worth another shape.
+        other = float(shape.reason.split()[-1])
+        assert shape.measured <= max(other / BETTER, other + WORTH) + 1e-3
+    table = {"name": "local", "objects": ["itself"], "proxy": "enclosing ellipsoid"}
+    data = make_stage(tmp_path, RING).config.model_dump(mode="json", exclude_unset=True)
+    shells = [table, {"name": "distant"}]
+    fixed = analyze(prepare_stage(parse_config({**data, "shells": shells}, "scene")))
+    for attributes in fixed.shells[0].proxies.values():
+        assert attributes["shape"] == "ellipsoid"
+        assert attributes["centre"] == attributes["origin"]
+
+
 def shiny_ball(folder: Path, roughness: float) -> Stage:
     """Prepare a ball of metal in a file, on a floor that is lit from one side."""
     floor, metal = (
@@ -188,11 +240,11 @@ def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
     )
     plan = analyze(stage)
     decided = [decision for decision in plan.decisions if not decision.automatic]
-    expected = ["split", 5, 4, True, True, False, "infinite", 32, False]
+    expected = ["split", 5, 4, True, True, False, "infinite", False, 32]
     assert [decision.value for decision in decided] == expected
     assert all(decision.reason == SET for decision in decided)
-    # What the quality decides needs no measuring, and neither do the shells of [PEM] §4.
-    others = [decision for decision in plan.decisions if decision.automatic and decision.key != "shells"]
+    # What the quality decides needs no measuring, nor do the shells of [PEM] §4, but for their shapes.
+    others = [d for d in plan.decisions if d.automatic and d.key not in ("shells", "shells.proxy")]
     assert all(decision.reason.startswith("normal quality") for decision in others)
     bake(stage.config, tmp_path / "pem", None, stage)
     pem = open_pem(tmp_path / "pem", stage)

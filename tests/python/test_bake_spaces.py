@@ -21,11 +21,14 @@ from mirrorbake.bake.bake import bake
 from mirrorbake.bake.fade import fit_fade, held_out
 from mirrorbake.bake.static_set import static_places
 from mirrorbake.errors import InputError, OptionError, StoreError
+from mirrorbake.evaluate.evaluate import evaluate
 from mirrorbake.evaluate.metrics import psnr
+from mirrorbake.evaluate.report import report
 from mirrorbake.pem.export.images import ImageFormat
 from mirrorbake.pem.export.map_sets import sample_set, static_set
 from mirrorbake.pem.export.source import export_source
 from mirrorbake.pem.export.web import WebPem
+from mirrorbake.pem.location import Location
 from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.render import render
 from mirrorbake.pem.store import PemStore
@@ -436,3 +439,24 @@ def test_how_far_a_sample_holds_is_found_in_its_own_scene_with_its_own_light(
     # Without its diffuse light there are 8 dB.
     assert found
     assert min(found) > 17.0
+
+
+def test_a_pem_at_a_url_is_evaluated_and_reported_like_one_in_a_folder(tmp_path: Path) -> None:
+    config = scene(tmp_path, {"kind": "fixed"})
+    url = f"memory://evaluate-{tmp_path.name}"
+    bake(config, url)
+    bake(config, tmp_path / "pem")
+    here, there = evaluate(tmp_path / "pem"), evaluate(url)
+    assert there.written
+    assert [view.metrics for view in there.views] == [view.metrics for view in here.views]
+    # What the first evaluation traced and measured lies beside the PEM.
+    place = Location(url)
+    assert place.joined("metrics.json").read_bytes() == there.to_json().encode()
+    again = evaluate(url)
+    assert [view.seconds for view in again.views] == [view.seconds for view in there.views]
+    with pytest.raises(OptionError, match=r"expected --out FILE"):
+        report(url)
+    page = report(url, tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "maps on disk" in page
+    with pytest.raises(StoreError, match=r"unknown://x/metrics\.json: cannot write: "):
+        Location("unknown://x").joined("metrics.json").write_bytes(b"")

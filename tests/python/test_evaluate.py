@@ -172,25 +172,25 @@ def test_references_are_kept_under_all_that_decides_their_light(baked: Baked, tm
     pem, camera = baked.open(), baked.stage.built.cameras.camera((0.25,))
     header, window = pem.store.header, (0, 0, 4, 4)
     cache = ReferenceCache(tmp_path, header.source, header.plan.depth)
-    names = {cache.path(camera, window)}
-    names.add(cache.path(camera, (0, 0, 4, 5)))
-    names.add(cache.path(baked.stage.built.cameras.camera((0.3,)), window))
-    names.add(ReferenceCache(tmp_path, header.source, header.plan.depth + 1).path(camera, window))
+    names = {cache.place(camera, window)}
+    names.add(cache.place(camera, (0, 0, 4, 5)))
+    names.add(cache.place(baked.stage.built.cameras.camera((0.3,)), window))
+    names.add(ReferenceCache(tmp_path, header.source, header.plan.depth + 1).place(camera, window))
     config = json.loads(json.dumps(header.source.config))
     config["material"]["r0"] = [0.5, 0.5, 0.5]
     changed = type(header.source)(header.source.library, config, header.source.inputs)
-    names.add(ReferenceCache(tmp_path, changed, header.plan.depth).path(camera, window))
+    names.add(ReferenceCache(tmp_path, changed, header.plan.depth).place(camera, window))
     assert len(names) == 5
     for axis in SCENE_AXES:
         config = {**header.source.config, axis: {"turn": 12.5}}
         changed = type(header.source)(header.source.library, config, header.source.inputs)
-        names.add(ReferenceCache(tmp_path, changed, header.plan.depth).path(camera, window))
+        names.add(ReferenceCache(tmp_path, changed, header.plan.depth).place(camera, window))
     assert len(names) == 5 + len(SCENE_AXES)
     # What is inferred from the light does not change it: studies share references.
     config = json.loads(json.dumps(header.source.config))
     config["infer"]["smoothness"], config["maps"]["size"] = 0.5, 8
     same = type(header.source)(header.source.library, config, header.source.inputs)
-    assert ReferenceCache(tmp_path, same, header.plan.depth).path(camera, window) in names
+    assert ReferenceCache(tmp_path, same, header.plan.depth).place(camera, window) in names
 
 
 def test_a_damaged_reference_is_traced_again(baked: Baked, tmp_path: Path) -> None:
@@ -198,7 +198,7 @@ def test_a_damaged_reference_is_traced_again(baked: Baked, tmp_path: Path) -> No
     window = object_window(baked.stage, camera)
     cache = ReferenceCache(tmp_path, header.source, header.plan.depth)
     cache.save(camera, trace_reference(baked.stage, camera, window, 2))
-    path = cache.path(camera, window)
+    path = cache.place(camera, window).path
     whole = path.read_bytes()
     assert cache.load(camera, window) is not None
     for damaged in (b"", whole[: len(whole) // 2], b"nonsense" + whole[8:]):

@@ -332,7 +332,7 @@ def test_every_part_has_its_own_material_and_the_static_set_is_the_pems(tmp_path
             shell.name for shell in store.header.parts[0].shells
         ]
         last = part["shells"][-1]
-        expected = stored[store.header.map_of(part["name"], last["name"]), : 6 * 64, :3]
+        expected = stored[store.header.map_of(part["name"], last["name"])][: 6 * 64, :3]
         step = (code["high"] - code["low"]) / 255.0
         codes = read_level(glb, last, 0, "radiance").reshape(-1, 3).astype(np.float64)
         radiance = np.maximum(np.exp2(code["low"] + codes * step) - code["epsilon"], 0.0)

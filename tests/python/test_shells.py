@@ -28,6 +28,7 @@ from mirrorbake.pem.export.source import export_source
 from mirrorbake.pem.export.web import MANIFEST_NAME, WebPem
 from mirrorbake.pem.layout import read_back, stored_map
 from mirrorbake.pem.opened import OpenedPem, open_pem
+from mirrorbake.pem.pyramid import size_of
 from mirrorbake.pem.view_images import images_of_trace
 from mirrorbake.proxy import proxy_from_attributes
 from mirrorbake.scene.build import build_scene
@@ -196,7 +197,8 @@ def test_samples_of_three_shells_have_the_same_bits_in_any_order(tmp_path: Path,
 
 
 def _stored(store: PemStore, texels: NDArray[np.float32]) -> NDArray[np.float32]:
-    return read_back(stored_map(texels, store.header)[0], store.header)
+    size = size_of(len(texels))
+    return read_back(stored_map(texels, size, store.header)[0], size, store.header)
 
 
 def test_every_export_has_all_shells(tmp_path: Path, three: OpenedPem) -> None:
@@ -347,8 +349,7 @@ def test_a_ground_on_its_plane_is_captured_apart_and_composes_to_the_capture(tmp
     assert np.all(ground[2, ..., 3] == 0.0)
     # Rays that look down meet the plane, which is the floor of a hemisphere.
     [_, plane, _] = analyze(stage).shells
-    assert plane.proxy is not None
-    proxy = proxy_from_attributes(plane.proxy)
+    proxy = proxy_from_attributes(plane.proxies["object"])
     assert proxy.kind == "hemisphere"
     eye, down = np.array([[0.05, 0.1, -0.03]], np.float32), np.array([[0.3, -0.5, 0.2]], np.float32)
     met = np.asarray(proxy.lookup(eye, down))[0] + np.array(proxy.origin)
@@ -361,12 +362,11 @@ def test_a_ground_under_a_panorama_is_on_its_plane_by_itself(tmp_path: Path) -> 
     stage = prepare_stage(parse_config(scene(tmp_path, "auto", surroundings=around), "ground"))
     plan = analyze(stage)
     [local, ground, distant] = plan.shells
-    assert (ground.name, distant.name, local.proxy) == ("ground", "distant", None)
-    assert ground.proxy is not None
-    assert distant.proxy is not None
+    assert (local.name, ground.name, distant.name) == ("local", "ground", "distant")
+    below, above = ground.proxies["object"], distant.proxies["object"]
     # The floor of a hemisphere, just below the object; the sky is as far away as it is.
-    assert (ground.proxy["shape"], distant.proxy["shape"]) == ("hemisphere", "infinite")
-    np.testing.assert_allclose(ground.proxy["centre"][1], 0.0, atol=1e-3)
+    assert (below["shape"], above["shape"]) == ("hemisphere", "infinite")
+    np.testing.assert_allclose(below["centre"][1], 0.0, atol=1e-3)
     decision = next(decision for decision in plan.decisions if decision.key == "shells")
     assert decision.automatic
     assert decision.measured is not None

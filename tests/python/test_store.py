@@ -29,6 +29,7 @@ from mirrorbake.scene.plan import Decision, Plan
 
 VIEWS, SIZE, WIDTH, HEIGHT = 3, 8, 6, 4
 TEXELS = 6 * (64 + 16 + 4 + 1)
+LID_SIZE, LID_TEXELS = 4, 6 * (16 + 4 + 1)
 # Rounding to float16: half a unit in the last of 11 bits, of values below 1; the residual adds its own.
 HALF_ROUNDING = 2.0**-11
 
@@ -51,7 +52,7 @@ def make_plan(samples: int = 4) -> Plan:
 
 def make_header(**changes: Any) -> Header:
     proxy: dict[str, Any] = {"shape": "infinite", "origin": [0.0, 0.0, 0.0]}
-    distant = Shell("distant", proxy, "body/distant", "all", moves=False)
+    distant = Shell("distant", proxy, "body/distant", SIZE, "all", moves=False)
     header = Header(
         source=Source(
             "1.2.3",
@@ -62,8 +63,8 @@ def make_header(**changes: Any) -> Header:
         space=ParameterSpace((Axis("arc", (0.0, 0.5, 1.0), 0.0, 1.0),)),
         rules=(ShellRule(name="local", objects=("itself",)), ShellRule(name="distant")),
         parts=(
-            Part("body", (Shell("local", proxy, "body/local", "all", moves=True), distant)),
-            Part("lid", (dataclasses.replace(distant, map="lid/distant"),)),
+            Part("body", (Shell("local", proxy, "body/local", SIZE, "all", moves=True), distant)),
+            Part("lid", (dataclasses.replace(distant, map="lid/distant", size=LID_SIZE),)),
         ),
         static={"infinite": proxy, "proxy": None, "fade": None},
         projection="cube",
@@ -81,7 +82,7 @@ def make_view(seed: int) -> tuple[dict[tuple[str, str], np.ndarray], ViewImages]
     maps = {
         ("body", "local"): random.random((TEXELS, 4), np.float32),
         ("body", "distant"): random.random((TEXELS, 3), np.float32),
-        ("lid", "distant"): random.random((TEXELS, 3), np.float32),
+        ("lid", "distant"): random.random((LID_TEXELS, 3), np.float32),
     }
     images = ViewImages(
         object=random.random((HEIGHT, WIDTH, 3), np.float32),
@@ -174,7 +175,7 @@ def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
     fill(make_store(tmp_path))
     group: Any = zarr.open_group(tmp_path / GROUP_NAME, mode="r")
     attributes: Any = group.attrs["mirrorbake"]
-    assert attributes["format_version"] == 5
+    assert attributes["format_version"] == 6
     sizes = attributes["conventions"]["level_sizes"]
     assert sizes == [8, 4, 2, 1]
     names = [entry["name"] for entry in attributes["maps"]]
@@ -189,7 +190,8 @@ def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
         np.testing.assert_allclose(values, expected[rows], rtol=0, atol=HALF_ROUNDING)
         offset += 6 * size * size
     # An opaque map beside one with α is opaque in it, too.
-    assert (np.asarray(group["maps"][1, names.index("lid/distant")])[: 6 * 64, 3] == 1).all()
+    assert (np.asarray(group["maps"][1, names.index("lid/distant")])[:LID_TEXELS, 3] == 1).all()
+    assert not np.asarray(group["maps"][1, names.index("lid/distant")])[LID_TEXELS:].any()
     record = dict(zip(attributes["record"], np.asarray(group["record"][1]), strict=True))
     assert record["trace_s"] == 1.0
     assert (record["iterations: body/local"], record["converged: body/local"]) == (7, 1)
@@ -325,7 +327,7 @@ def test_damaged_metadata_is_one_clear_error(tmp_path: Path) -> None:
         other = json.loads(intact)
         other["attributes"]["mirrorbake"]["format_version"] = version
         metadata.write_text(json.dumps(other))
-        with pytest.raises(StoreError, match=f"format version {version}, this library reads 5.*{advice}"):
+        with pytest.raises(StoreError, match=f"format version {version}, this library reads 6.*{advice}"):
             PemStore.open(tmp_path)
 
 
@@ -455,7 +457,9 @@ def test_parts_may_share_a_map(tmp_path: Path) -> None:
     )
     store = make_store(tmp_path, parts=parts)
     assert [entry.name for entry in store.header.maps] == ["body/local", "shared distant"]
-    fill(store)
+    maps, images = make_view(1)
+    maps["lid", "distant"] = maps["body", "distant"]
+    store.write_view(1, maps, images, Timings(1.0, 2.0, 3.0), REPORTS)
     np.testing.assert_array_equal(store.read_map("body", "distant", 1), store.read_map("lid", "distant", 1))
     assert PemStore.open(tmp_path).header == store.header
 

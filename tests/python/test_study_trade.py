@@ -22,7 +22,7 @@ from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.study.trade import maps, show
 from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of
 from mirrorbake.study.trade.drawing import FILTERS, Drawing, draw_samples
-from mirrorbake.study.trade.study import STUDY_NAME, Study, advice, study
+from mirrorbake.study.trade.study import STUDY_NAME, Study, advice, shrunk, singles_of, study
 from mirrorbake.study.trade.trial import Trial, overridden
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def test_every_axis_starts_with_the_scenes_own_choice() -> None:
             is_own = setting is axis.settings[0]
             altered = changed != config or setting.drawing != Drawing() or setting.levels or setting.storage
             assert bool(altered) != is_own
-    assert [s.label for s in axes[0].settings] == ["16", "4", "8", "32"]
+    assert [s.label for s in axes[0].settings] == ["16", "for each part", "4", "8", "32"]
 
 
 def test_a_mesh_of_one_part_is_cut_and_one_view_has_no_spacing(tmp_path: Path) -> None:
@@ -390,3 +390,24 @@ def test_study_takes_a_scene_or_the_name_of_a_study(tmp_path: Path) -> None:
     assert "fresnel" in result.stdout
     missing = CliRunner().invoke(app, ["study", str(tmp_path / "none.toml")])
     assert missing.exit_code == 3
+
+
+def test_a_study_that_ends_early_has_looked_at_every_axis() -> None:
+    def axis(name: str, *bakes: bool) -> Axis:
+        settings = [Setting(str(n), {"maps.size": 8} if bakes_it else {}) for n, bakes_it in enumerate(bakes)]
+        return Axis(name, name, (Setting("own"), *settings))
+
+    order = singles_of([axis("a", True, True), axis("b", False), axis("c", True, False, True)])
+    assert [(name, setting.label) for settings in order for name, setting in settings.items()] == [
+        *(("b", "0"), ("c", "1"), ("a", "0"), ("c", "0"), ("a", "1"), ("c", "2"))
+    ]
+
+
+def test_trials_have_small_pictures_and_maps_as_much_smaller() -> None:
+    config = parse_config({"views": {"size": [480, 360]}, "maps": {"size": 128}}, "scene")
+    small = shrunk(config, 160)
+    assert (small.views.size, small.maps.size) == ((160, 120), 64)
+    assert shrunk(small, 160) is small
+    assert shrunk(parse_config({"views": {"size": [480, 360]}}, "scene"), 160).maps.size is None
+    tiny = parse_config({"views": {"size": [480, 360]}, "maps": {"size": 8}}, "scene")
+    assert shrunk(tiny, 160).maps.size == 8

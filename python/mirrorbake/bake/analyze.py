@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from mirrorbake import _core
 from mirrorbake.bake.count_parts import parts_decision
 from mirrorbake.bake.distant import distant_decision
+from mirrorbake.bake.map_sizes import map_sizes
 from mirrorbake.bake.probe import (
     LOBE_PROBE_SAMPLES,
     Probe,
     displayed_noise,
-    probe_points,
     relative_change,
     relative_spread,
 )
@@ -32,10 +31,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from mirrorbake import _core
     from mirrorbake.scene.config import Parts
     from mirrorbake.scene.stage import Stage
-
-    DoubleArray = NDArray[np.float64]
 
 
 MAX_DEPTH = 16
@@ -44,10 +42,6 @@ MAX_DEPTH = 16
 MIRROR_SAMPLES = 16
 MOST_SAMPLES = 256
 """Per pixel; a scene file may set more."""
-SMALLEST_MAP, LARGEST_MAP = 16, 1024
-"""A scene file may set other sizes."""
-TEXELS_PER_LOBE = 4
-"""Texels along a rough lobe's width at half of its height: more show nothing new."""
 
 _SET = "set in the scene"
 
@@ -83,7 +77,11 @@ def analyze(stage: Stage) -> Plan:
     on_hull = stage.built.on_hull[probe.triangle]
     local = _local(stage, probe, on_hull)
     samples = _samples(stage, cast("int", depth.value))
-    size = _map_size(stage, proxy)
+    hull_split = _hull_split(stage, on_hull, any_local=any(decision.value for decision in local))
+    shared = shared_distant(stage, probe, proxy)
+    has_local = {name: _is_local(local, name) for name in stage.built.part_names}
+    planned, geometry = planned_shells(stage, probe, has_local, proxy)
+    sizes = map_sizes(stage, planned, hull_split=bool(hull_split.value), shared=bool(shared.value))
     decisions = [
         parts,
         depth,
@@ -91,15 +89,15 @@ def analyze(stage: Stage) -> Plan:
         _diffuse(stage, probe),
         shells,
         *local,
-        _hull_split(stage, on_hull, any_local=any(decision.value for decision in local)),
+        hull_split,
+        *geometry,
         distant,
-        size,
-        shared_distant(stage, probe, proxy),
+        shared,
+        *sizes,
         *quality_decisions(stage, cast("int", samples.value)),
     ]
-    advice = advice_of(stage, probe, single, cast("int", size.value))
-    has_local = {name: _is_local(local, name) for name in stage.built.part_names}
-    planned = planned_shells(stage, probe, has_local, proxy)
+    of_last = (size.value for size in sizes if size.shell in (None, planned[-1].name))
+    advice = advice_of(stage, probe, single, max(cast("int", size) for size in of_last))
     return Plan(tuple(decisions), proxy_to_attributes(proxy), planned, tuple(advice))
 
 
@@ -218,78 +216,6 @@ def _hull_split(stage: Stage, on_hull: NDArray[np.bool_], *, any_local: bool) ->
     share = float(np.mean(on_hull))
     reason = f"{share:.0%} of what the views see lies on the convex hull and cannot reflect the object"
     return Decision("layers.hull_split", None, share > 0.0, True, reason, share)
-
-
-def _map_size(stage: Stage, proxy: _core.Proxy) -> Decision:
-    config = stage.config
-    if config.maps.size is not None:
-        return Decision("maps.size", None, config.maps.size, False, _SET, None)
-    share = config.auto.finer_share
-    steps = _lookup_steps(stage, proxy)
-    if not len(steps):
-        return Decision("maps.size", None, SMALLEST_MAP, True, "no view sees the object", None)
-    step = float(np.quantile(steps, share))
-    reason = f"all but {share:.0%} of the pixels read places at least {math.degrees(step):.2g} degrees apart"
-    width = (
-        min(_lobe_width(material) for material in _materials(stage) if material.specular) / TEXELS_PER_LOBE
-    )
-    if width > step:
-        step = width
-        reason = (
-            f"the lobe is {math.degrees(TEXELS_PER_LOBE * width):.2g} degrees wide and blurs what is finer"
-        )
-    # A cube face spans 2 at distance 1: in its middle a texel is 2/size radians wide.
-    wanted = 2 ** math.ceil(math.log2(2.0 / step))
-    size = min(max(wanted, SMALLEST_MAP), LARGEST_MAP)
-    reason += f"; a texel is {math.degrees(2.0 / size):.2g}"
-    if wanted > LARGEST_MAP:
-        reason += f", since {LARGEST_MAP} is the most that is chosen automatically"
-    return Decision("maps.size", None, size, True, reason, step)
-
-
-def _lookup_steps(stage: Stage, proxy: _core.Proxy) -> DoubleArray:
-    """Angles between the places of the distant map that neighbouring pixels read, radians."""
-    # Differentials are extrapolated over a small part of a pixel, where lookups are close to linear.
-    part = 1.0 / 16.0
-    options = _core.TraceOptions(samples_per_pixel=1, seed=stage.config.trace.seed)
-    steps = []
-    for point in probe_points(stage):
-        moved = stage.at(point)
-        seen = moved.tracer.trace_visibility(
-            moved.built.cameras.camera(point), moved.built.reflector, options
-        )
-        position, reflection = seen.position + np.array(seen.origin), np.asarray(seen.reflection, float)
-        still = np.zeros_like(position)
-        middle, right, below = (
-            _unit(proxy.lookup_float64(position + part * np.asarray(dp), reflection + part * np.asarray(dr)))
-            for dp, dr in (
-                (still, still),
-                (seen.dposition_dx, seen.dreflection_dx),
-                (seen.dposition_dy, seen.dreflection_dy),
-            )
-        )
-        area = np.linalg.norm(np.cross(right - middle, below - middle), axis=1)
-        steps.append(np.sqrt(area) / part)
-    angles = np.concatenate(steps)
-    return angles[angles > 0.0]
-
-
-def _unit(vectors: DoubleArray) -> DoubleArray:
-    unit: DoubleArray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return unit
-
-
-def _lobe_width(material: _core.Material) -> float:
-    """Full width at half of its height, radians, of a lobe along the normal; 0: a mirror, or not known."""
-    if material.roughness_texture.texture >= 0:
-        return 0.0
-    if material.lobe == "phong":
-        return 2.0 * math.acos(0.5 ** (1.0 / material.exponent))
-    if material.lobe == "ggx":
-        # The density of facets goes with (1 + tan²/α²)⁻², which is half at tan² = (√2 − 1)α²; reflection
-        # doubles angles.
-        return 4.0 * math.atan(material.roughness * math.sqrt(math.sqrt(2.0) - 1.0))
-    return 0.0
 
 
 def _materials(stage: Stage) -> list[_core.Material]:

@@ -98,7 +98,7 @@ def _score(
 
     def read(part: str, shell: str) -> np.ndarray:
         number = header.map_of(part, shell)
-        return np.ascontiguousarray(texels[0, number, :, : header.maps[number].channels])
+        return np.ascontiguousarray(texels[0][number][:, : header.maps[number].channels])
 
     irradiance = None if contents.irradiance is None else contents.irradiance[0]
     if irradiance is not None and stage.space.changes_scene:

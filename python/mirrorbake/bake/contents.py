@@ -121,7 +121,7 @@ def _part(built: BuiltScene, plan: Plan, number: int, *, shared: bool) -> Part:
     hull: Literal["all", "off hull"] = "off hull" if plan.has_hull_split else "all"
     shells = []
     for planned, section in zip(plan.shells, plan.shell_sections, strict=True):
-        if name not in planned.parts:
+        if name not in planned.proxies:
             continue
         # A map that all parts read bears the name of its shell alone.
         is_last = planned is plan.shells[-1]
@@ -130,16 +130,11 @@ def _part(built: BuiltScene, plan: Plan, number: int, *, shared: bool) -> Part:
         shells.append(
             Shell(
                 planned.name,
-                planned.proxy or _ellipsoid_about(built, number),
+                planned.proxies[name],
                 its_map,
+                plan.size_of(name, planned.name),
                 hull if section.is_itself else "all",
                 moves=section.is_itself,
             )
         )
     return Part(name, tuple(shells))
-
-
-def _ellipsoid_about(built: BuiltScene, number: int) -> dict[str, Any]:
-    triangles = built.triangles[built.parts == number]
-    centre = _core.area_weighted_centroid(built.positions, triangles)
-    return proxy_to_attributes(_core.fit_ellipsoid(built.positions[np.unique(triangles)], centre))

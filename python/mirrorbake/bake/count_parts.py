@@ -98,25 +98,46 @@ def disagreement(probe: Probe, labels: Labels) -> float:
     labels
         (T,) part of every triangle.
     """
-    if not len(probe.view):
+    shown = srgb_encoded(np.clip(probe.fresnel * probe.incident, 0.0, 1.0))
+    group = probe.view.astype(np.int64) * 65536 + labels[probe.triangle]
+    return collision_of(probe.reflection, shown, group)
+
+
+def collision_of(
+    lookup: NDArray[np.floating], shown: NDArray[np.float64], group: NDArray[np.integer], texels: int = TEXELS
+) -> float:
+    """Root mean square difference of values that samples want of one texel.
+
+    Parameters
+    ----------
+    lookup
+        (n, 3): where samples read a map.
+    shown
+        (n, C): what they want there, of the display's range.
+    group
+        (n,): numbers of the maps that they read.
+    texels
+        Along a side of a cube's face.
+    """
+    if not len(lookup):
         return 0.0
-    direction = probe.reflection.astype(np.float64)
+    direction = lookup.astype(np.float64)
     rows = np.arange(len(direction))
     axis = np.argmax(np.abs(direction), axis=1)
     major = direction[rows, axis]
     cells = [
-        np.clip((0.5 + 0.5 * direction[rows, (axis + turn) % 3] / np.abs(major)) * TEXELS, 0, TEXELS - 1)
+        np.clip((0.5 + 0.5 * direction[rows, (axis + turn) % 3] / np.abs(major)) * texels, 0, texels - 1)
         for turn in (1, 2)
     ]
     face = 2 * axis + (major < 0.0)
-    texel = (face * TEXELS + cells[0].astype(np.int64)) * TEXELS + cells[1].astype(np.int64)
-    group = (probe.view.astype(np.int64) * 65536 + labels[probe.triangle]) * (6 * TEXELS * TEXELS) + texel
-    _, place, count = np.unique(group, return_inverse=True, return_counts=True)
+    texel = (face * texels + cells[0].astype(np.int64)) * texels + cells[1].astype(np.int64)
+    key = group.astype(np.int64) * (6 * texels * texels) + texel
+    _, place, count = np.unique(key, return_inverse=True, return_counts=True)
     place = place.reshape(-1)
-    shown = srgb_encoded(np.clip(probe.fresnel * probe.incident, 0.0, 1.0))
     several = count > 1
-    total, samples = 0.0, 3.0 * float(count[several].sum())
-    for channel in range(3):
+    channels = shown.shape[1]
+    total, samples = 0.0, channels * float(count[several].sum())
+    for channel in range(channels):
         values = shown[:, channel].astype(np.float64)
         mean = np.bincount(place, values) / count
         squares = np.bincount(place, (values - mean[place]) ** 2)

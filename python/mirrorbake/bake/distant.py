@@ -8,7 +8,8 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.bake.capture_place import capture_place
-from mirrorbake.bake.shell_shapes import MIN_HITS, choose_shape, shell_distances
+from mirrorbake.bake.local_shapes import MIN_HITS
+from mirrorbake.bake.shell_shapes import choose_shape, shell_distances
 from mirrorbake.errors import InputError
 from mirrorbake.scene.plan import Decision
 

@@ -92,7 +92,7 @@ def held_out(
 
     def static(part: str, shell: str) -> FloatArray:
         number = header.map_of(part, shell)
-        return np.ascontiguousarray(static_maps[number, :, : header.maps[number].channels])
+        return np.ascontiguousarray(static_maps[number][:, : header.maps[number].channels])
 
     sets = [
         shell_maps(header, read, pose, contents.local_triangles)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.pem.pyramid import coarse_end
 from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.store import SolverReport
 
@@ -53,19 +54,21 @@ class DisplayFitter:
         assert infer.passes is not None, "the scene has to be planned first"
         self._options = _core.DisplayFitOptions(solve=solve_options(infer), passes=infer.passes)
         self._numbers = {entry.name: number for number, entry in enumerate(header.maps)}
+        self._topologies = header.topologies
 
-    def captured_prior(self, captured: Mapping[str, FloatArray]) -> FloatArray:
-        """Return RGB of all maps (M, T, 3): of shells that are captured their pyramids (T, 3), else black."""
-        prior = np.zeros((len(self._numbers), self._header.topology.texels, 3), np.float32)
+    def captured_prior(self, captured: Mapping[str, FloatArray]) -> list[FloatArray]:
+        """Return RGB of each map (T, 3): of shells that are captured their pyramids, else black."""
+        prior = [np.zeros((topology.texels, 3), np.float32) for topology in self._topologies]
         for part in self._header.parts:
             for shell in part.shells:
                 if shell.name in captured:
-                    prior[self._numbers[shell.map]] = captured[shell.name]
+                    number = self._numbers[shell.map]
+                    prior[number] = coarse_end(captured[shell.name], len(prior[number]))
         return prior
 
     def fit(
-        self, views: Sequence[FitView], pose: Pose, prior: FloatArray | None, nodes: int = 1
-    ) -> tuple[FloatArray, SolverReport]:
+        self, views: Sequence[FitView], pose: Pose, prior: Sequence[FloatArray] | None, nodes: int = 1
+    ) -> tuple[list[list[FloatArray]], SolverReport]:
         """Fit maps.
 
         Parameters
@@ -75,14 +78,15 @@ class DisplayFitter:
         pose
             Where the object is.
         prior
-            (M, T, 3), RGB of all maps, to which what no view determines falls back; None: a smooth fill.
+            RGB of each map (T, 3), to which what no view determines falls back; None: a smooth fill.
         nodes
             How many sets of maps the views blend.
 
         Returns
         -------
         tuple
-            (nodes, M, T, 4), premultiplied radiance and α; and how the last pass of the solver ended.
+            For each node and map (T, 4), premultiplied radiance and α; and how the last pass of the solver
+            ended.
         """
         header = self._header
         shells = [
@@ -102,12 +106,13 @@ class DisplayFitter:
                 for one in views
             ],
             shells,
-            [header.topology] * len(self._numbers),
+            self._topologies,
             nodes,
             run_time=self._model,
             options=self._options,
-            prior=None if prior is None else np.concatenate([prior.reshape(-1, 3)] * nodes),
+            prior=None if prior is None else np.concatenate([*prior] * nodes),
         )
         last = passes[-1]
         report = SolverReport(last.iterations, float(last.relative_gradient), last.converged)
-        return np.asarray(texels).reshape(nodes, len(self._numbers), -1, 4), report
+        ends = np.cumsum([topology.texels for topology in self._topologies])[:-1]
+        return [np.split(maps, ends) for maps in np.split(np.asarray(texels), nodes)], report

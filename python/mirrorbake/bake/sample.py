@@ -13,6 +13,7 @@ from mirrorbake.bake.captured import captured_pyramids
 from mirrorbake.bake.fit import DisplayFitter, FitView, solve_options
 from mirrorbake.bake.static_set import static_views
 from mirrorbake.bake.targets import ViewTracer
+from mirrorbake.pem.pyramid import coarse_end
 from mirrorbake.pem.run_time import lookups_of
 from mirrorbake.pem.store import SolverReport, Timings
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
@@ -108,7 +109,7 @@ class SampleBaker:
         self._static_maps = contents.static_maps
         self._sides = contents.lit_sides
         self._local_triangles = contents.local_triangles
-        self._topology = contents.header.topology
+        self._topologies = contents.header.topologies
         self._infer = stage.config.infer
         if self._infer.fit == "display":
             self._tracer = ViewTracer(stage, contents.header)
@@ -143,18 +144,18 @@ class SampleBaker:
             nodes, views = [index], static_views(tracer, stage)
         else:
             nodes, views = self._with_neighbours(index)
-        prior: FloatArray | None = None
+        prior: list[FloatArray] | None = None
         if self._infer.prior == "captured":
             prior = self._fitter.captured_prior(captured)
             if self._static_maps is not None:
-                prior = np.ascontiguousarray(self._static_maps[..., :3])
+                prior = [np.ascontiguousarray(texels[:, :3]) for texels in self._static_maps]
         middle = time.perf_counter()
         texels, report = self._fitter.fit(views, pose, prior, len(nodes))
         mine = texels[nodes.index(index)]
         maps = {}
         for name in header.map_names():
             number = header.map_of(*name)
-            maps[name] = np.ascontiguousarray(mine[number, :, : header.maps[number].channels])
+            maps[name] = np.ascontiguousarray(mine[number][:, : header.maps[number].channels])
         seconds = Timings(middle - start, 0.0, time.perf_counter() - middle)
         rejected = sum(one.view.targets.rejected for one in views)
         return BakedSample(maps, own.images, irradiance, seconds, dict.fromkeys(maps, report), rejected)
@@ -192,7 +193,7 @@ class SampleBaker:
         seconds = [time.perf_counter() - start, 0.0, 0.0]
         maps: Maps = {}
         reports: Reports = {}
-        for entry in self._header.maps:
+        for entry, topology in zip(self._header.maps, self._topologies, strict=True):
             start = time.perf_counter()
             matrices, targets, prior = [], [], None
             readers = []
@@ -202,10 +203,11 @@ class SampleBaker:
                         continue
                     readers.append((part.name, shell.name))
                     # Channels beyond colour have no prior.
-                    prior = captured.get(shell.name) if entry.channels == 3 else None
+                    if entry.channels == 3 and shell.name in captured:
+                        prior = coarse_end(captured[shell.name], topology.texels)
                     off_hull = self._local_triangles if shell.polygons == "off hull" else None
                     matrix = _core.build_rendering_matrix(
-                        trace.samples, number, shell.proxy_at(pose), self._topology, lookup, off_hull
+                        trace.samples, number, shell.proxy_at(pose), topology, lookup, off_hull
                     )
                     if matrix.rows:
                         matrices.append(matrix)
@@ -214,7 +216,7 @@ class SampleBaker:
                             matrix.row_means(_incident(trace.samples, first, ends[place], entry.channels))
                         )
             middle = time.perf_counter()
-            texels, report = self._infer_layer(matrices, targets, prior, entry.channels)
+            texels, report = self._infer_layer(topology, matrices, targets, prior, entry.channels)
             maps.update(dict.fromkeys(readers, texels))
             reports.update(dict.fromkeys(readers, report))
             seconds[1] += middle - start
@@ -223,6 +225,7 @@ class SampleBaker:
 
     def _infer_layer(
         self,
+        topology: _core.TexelTopology,
         matrices: list[_core.RenderingMatrix],
         targets: list[FloatArray],
         prior: FloatArray | None,
@@ -230,7 +233,7 @@ class SampleBaker:
     ) -> tuple[FloatArray, SolverReport]:
         # The solver starts from the captured map, never from a neighbour's maps as they were baked.
         if not matrices:
-            none = np.zeros((self._topology.texels, channels), np.float32)
+            none = np.zeros((topology.texels, channels), np.float32)
             return none if prior is None else np.asarray(prior), SolverReport(0, 0.0, True)
         weights = [
             _core.display_row_weights(matrix, self._stage.options.samples_per_pixel, target)
@@ -238,7 +241,7 @@ class SampleBaker:
         ]
         solver = _core.MapSolver(
             [(matrix, [(0, 1.0)]) for matrix in matrices],
-            [self._topology],
+            [topology],
             options=solve_options(self._infer),
         )
         captured = self._infer.prior == "captured"

@@ -8,11 +8,12 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.bake.capture_place import capture_place
+from mirrorbake.bake.local_shapes import MIN_HITS, local_shape
 from mirrorbake.bake.probe import probe_points
 from mirrorbake.errors import InputError
 from mirrorbake.proxy import choose_proxy, proxy_to_attributes
 from mirrorbake.scene.config_shells import DEFAULT_SHELLS
-from mirrorbake.scene.plan import PlannedShell
+from mirrorbake.scene.plan import Decision, PlannedShell
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from mirrorbake.bake.probe import Probe
     from mirrorbake.scene.stage import Stage
 
-MIN_HITS = 100
-"""Below this many reflected rays there is nothing to fit a shape to."""
 PLANE_REACH = 100.0
 """Radius of the sky over a plane, in units of how far away the plane is met. It holds what the rays that look
 away from the plane would meet, which is nothing of the plane's."""
@@ -32,6 +31,8 @@ FLAT = 0.02
 """Thickness of a flat thing over its distance from the object."""
 SEEN = 1e-3
 """Share of a part's rays below which it has no map of a shell."""
+
+_SET = "set in the scene"
 
 
 def traced_hits(stage: Stage, probe: Probe, hidden: Sequence[int]) -> tuple[FloatArray, NDArray[np.int32]]:
@@ -60,15 +61,29 @@ def shell_distances(stage: Stage, probe: Probe, shell: int) -> FloatArray:
     What the shells before it hold at any distance is left out, and so is the object, unless the shell holds
     it. 0 where the ray meets another shell's; the last one's rays may be infinite.
     """
-    rules = stage.shell_rules
+    distances = np.empty(len(probe.view), np.float32)
+    for number, point in enumerate(probe_points(stage)):
+        chosen = probe.view == number
+        distances[chosen] = held_distances(
+            stage.at(point), probe.position[chosen], probe.reflection[chosen], shell
+        )
+    return distances
+
+
+def held_distances(stage: Stage, position: FloatArray, reflection: FloatArray, shell: int) -> FloatArray:
+    """Return lengths (n,) of reflected rays from places (n, 3) of a stage, as `shell_distances` does."""
+    rules, reflector = stage.shell_rules, stage.built.reflector
     itself = _core.ShellRule.ITSELF
     before = [i for rule in rules[:shell] if not rule.has_limits for i in rule.objects]
-    distances, objects = traced_hits(
-        stage, probe, before if itself in rules[shell].objects else [itself, *before]
+    hidden = before if itself in rules[shell].objects else [itself, *before]
+    distances, objects = stage.tracer.intersect_distance(
+        np.ascontiguousarray(position),
+        np.ascontiguousarray(reflection),
+        sorted({reflector if i == itself else i for i in hidden}),
     )
     held = np.zeros(len(distances), np.bool_)
     for k, rule in enumerate(rules[: shell + 1]):
-        mine = rule.holds(objects, distances, stage.built.reflector).astype(np.bool_) & ~held
+        mine = rule.holds(objects, distances, reflector).astype(np.bool_) & ~held
         if k == shell and shell + 1 < len(rules):
             return np.where(mine, distances, np.float32(0.0)).astype(np.float32)
         if k < shell:
@@ -117,45 +132,55 @@ def choose_shape(
     )
 
 
-def fit_shape(stage: Stage, probe: Probe, shell: int, wanted: str) -> _core.Proxy:
-    """Fit the shape of a shell that is not the last.
+def fit_shape(stage: Stage, probe: Probe, shell: int, wanted: str) -> tuple[_core.Proxy, Decision]:
+    """Fit the shape of a shell that is not the last, and does not hold the object alone.
 
     Raises
     ------
     InputError
         A finite shape is wanted for what no ray meets, or a plane for what lies around the object.
     """
-    origin = capture_place(stage).position
+    origin, name = capture_place(stage).position, stage.shell_rules[shell].name
+
+    def decided(value: str, reason: str, measured: float | None = None) -> Decision:
+        return Decision("shells.proxy", None, value, wanted == "auto", reason, measured, name)
+
     if wanted == "infinite":
-        return _core.Proxy.infinite(origin)
+        return _core.Proxy.infinite(origin), decided(wanted, _SET)
     distances = shell_distances(stage, probe, shell)
     met = distances > 0.0
-    name = stage.shell_rules[shell].name
     if int(met.sum()) < MIN_HITS:
         if wanted == "auto":
-            return _core.Proxy.infinite(origin)
+            reason = f"{int(met.sum())} rays of the trial images meet what it holds, too few for a fit"
+            return _core.Proxy.infinite(origin), decided("infinite", reason)
         raise InputError(
             f'shells.{name}: proxy = {wanted!r}: no reflected ray of a trial image meets it; expected "auto"'
         )
     hits = probe.position[met] + distances[met, None] * probe.reflection[met]
     if wanted in ("auto", "plane"):
         plane, thickness = plane_through(hits, origin)
-        if plane is not None and (wanted == "plane" or thickness < FLAT):
-            return plane
+        if plane is not None and wanted == "plane":
+            return plane, decided(wanted, _SET)
+        if plane is not None and thickness < FLAT:
+            reason = f"what it holds is {thickness:.1%} as thick as it is far"
+            return plane, decided("plane", reason, thickness)
         if wanted == "plane":
             raise InputError(
                 f"shells.{name}: proxy = 'plane': the plane through what it holds passes through the object"
             )
     choice = choose_shape(probe, distances, met, origin)
     if wanted == "auto":
-        return choice.best.proxy
-    return next(candidate.proxy for candidate in choice.candidates if candidate.name == wanted)
+        best = choice.best
+        reason = choice.reason.removeprefix(f"{best.name}: ").removesuffix(".")
+        return best.proxy, decided(best.name, reason, best.off_view_error)
+    fitted = next(candidate.proxy for candidate in choice.candidates if candidate.name == wanted)
+    return fitted, decided(wanted, _SET)
 
 
 def planned_shells(
     stage: Stage, probe: Probe, local: Mapping[str, bool], last: _core.Proxy
-) -> tuple[PlannedShell, ...]:
-    """Return the shells of a plan.
+) -> tuple[tuple[PlannedShell, ...], list[Decision]]:
+    """Return the shells of a plan, and the decisions on the geometry of all but the last.
 
     Parameters
     ----------
@@ -169,18 +194,30 @@ def planned_shells(
         Shape of the last shell.
     """
     names, shells = stage.built.part_names, stage.config.shells or DEFAULT_SHELLS
-    planned = []
+    planned, decisions = [], list[Decision]()
     for number, shell in enumerate(shells[:-1]):
-        itself = shell.is_itself
         alpha = probe.shells[number][:, 3]
         seen = {name: alpha[probe.part == part] for part, name in enumerate(names)}
         parts = [
             name
             for name in names
-            if (local[name] if itself else len(seen[name]) and float(np.mean(seen[name])) > SEEN)
+            if (local[name] if shell.is_itself else len(seen[name]) and float(np.mean(seen[name])) > SEEN)
         ]
-        proxy = None
-        if not itself or shell.proxy not in ("auto", "ellipsoid"):
-            proxy = proxy_to_attributes(fit_shape(stage, probe, number, shell.proxy))
-        planned.append(PlannedShell(shell.name, proxy, tuple(parts)))
-    return (*planned, PlannedShell(shells[-1].name, proxy_to_attributes(last), tuple(names)))
+        proxies: dict[str, _core.Proxy] = {}
+        if shell.is_itself and shell.proxy != "plane" and parts:
+            distances = shell_distances(stage, probe, number)
+            for name in parts:
+                proxies[name], decision = local_shape(
+                    stage, probe, distances, number, names.index(name), shell.proxy
+                )
+                decisions.append(decision)
+        elif parts:
+            proxy, decision = fit_shape(stage, probe, number, shell.proxy)
+            proxies = dict.fromkeys(parts, proxy)
+            decisions.append(decision)
+        planned.append(_planned(shell.name, proxies))
+    return (*planned, _planned(shells[-1].name, dict.fromkeys(names, last))), decisions
+
+
+def _planned(name: str, proxies: Mapping[str, _core.Proxy]) -> PlannedShell:
+    return PlannedShell(name, {part: proxy_to_attributes(proxy) for part, proxy in proxies.items()})

@@ -12,10 +12,10 @@ from mirrorbake import _core
 from mirrorbake.bake.capture_place import capture_place
 from mirrorbake.bake.captured import captured_shells
 from mirrorbake.bake.distant import distant_decision
+from mirrorbake.bake.local_shapes import MIN_HITS
 from mirrorbake.bake.probe import pixel_means, probe_points
 from mirrorbake.bake.shell_shapes import (
     FLAT,
-    MIN_HITS,
     fit_shape,
     plane_through,
     traced_hits,
@@ -231,7 +231,7 @@ def captured_error(
     trace = stage.config.trace.model_copy(update={"samples": CAPTURE_SAMPLES, "depth": depth, "noise": 0.0})
     stage = replace(stage, config=stage.config.model_copy(update={"shells": shells, "trace": trace}))
     proxies = [
-        None if shell.is_itself else fit_shape(stage, probe, number, shell.proxy)
+        None if shell.is_itself else fit_shape(stage, probe, number, shell.proxy)[0]
         for number, shell in enumerate(shells[:-1])
     ]
     proxies.append(last or distant_decision(stage, probe)[1])

@@ -142,7 +142,7 @@ def static_views(
 
 def infer_static_set(
     stage: Stage, contents: Contents, report: Callable[[int, int, str], None]
-) -> tuple[FloatArray, SolverReport]:
+) -> tuple[tuple[FloatArray, ...], SolverReport]:
     """Infer a static set.
 
     Parameters
@@ -157,7 +157,7 @@ def infer_static_set(
     Returns
     -------
     tuple
-        (M, T, 4), premultiplied radiance and α of all maps, as they will be read from storage; and how the
+        (T, 4), premultiplied radiance and α, of each map, as they will be read from storage; and how the
         solver ended.
     """
     header = contents.header
@@ -167,5 +167,8 @@ def infer_static_set(
     if stage.config.infer.prior == "captured":
         prior = fitter.captured_prior(captured_pyramids(stage, header, contents.capture))
     texels, solver = fitter.fit(views, AT_REST, prior)
-    stored = [read_back(stored_map(pyramid, header)[0], header) for pyramid in texels[0]]
-    return np.stack(stored), solver
+    stored = []
+    for pyramid, entry in zip(texels[0], header.maps, strict=True):
+        values, _ = stored_map(pyramid, entry.size, header)
+        stored.append(read_back(values, entry.size, header))
+    return tuple(stored), solver

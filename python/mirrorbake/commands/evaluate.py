@@ -9,8 +9,8 @@ import typer
 from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
 from mirrorbake.commands.options import (
-    Folder,
     Json,
+    Place,
     Threads,
     print_figures,
 )
@@ -19,7 +19,7 @@ from mirrorbake.commands.progress import messages, progress
 
 @reports_errors
 def evaluate_command(
-    directory: Folder,
+    directory: Place,
     json: Json = False,
     every: Annotated[
         bool, typer.Option("--all", help="Look at every sample and between every two, not at a selection.")
@@ -28,9 +28,11 @@ def evaluate_command(
 ) -> None:
     """Compare a PEM and its rivals with independent ray tracing, on its samples, between and off them."""
     from mirrorbake.evaluate.evaluate import METRICS_NAME, evaluate
+    from mirrorbake.pem.location import Location
 
+    location = Location.of(directory)
     with _core.ThreadLimit(threads), progress() as add_bar:
-        evaluation = evaluate(directory, add_bar("evaluate"), every_view=every)
+        evaluation = evaluate(location, add_bar("evaluate"), every_view=every)
     print_figures(evaluation, json)
     if evaluation.written:
-        messages.print(f"wrote {directory / METRICS_NAME}", markup=False, soft_wrap=True)
+        messages.print(f"wrote {location.joined(METRICS_NAME)}", markup=False, soft_wrap=True)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from mirrorbake.commands.errors import reports_errors
-from mirrorbake.commands.options import Json
+from mirrorbake.commands.options import Json, Place
 from mirrorbake.commands.progress import messages, progress
 
 if TYPE_CHECKING:
     from mirrorbake.pem.store import PemStore
-
-Place = Annotated[str, typer.Argument(metavar="DIR", help="Folder or URL with a PEM.", show_default=False)]
 
 EXIT_DAMAGED = 3
 
@@ -49,7 +47,8 @@ def _describe(store: PemStore) -> dict[str, Any]:
         f"{part.name}: " + ", ".join(f"{shell.name} on {shell.proxy['shape']}" for shell in part.shells)
         for part in header.parts
     ]
-    maps = f"{len(header.maps)} of {header.map_size}² × 6 texels with all levels, {header.precision}"
+    texels = f"{header.sizes_in_words} × {header.faces} texels"
+    maps = f"{len(header.maps)} of {texels} with all levels, {header.precision}"
     size = "none yet" if first is None else f"{store.sample_bytes(first) / 1e6:.3g} MB (sample {first})"
     run_time = header.run_time
     return {

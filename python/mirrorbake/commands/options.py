@@ -55,6 +55,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print the figures as JSON in
 Folder = Annotated[
     Path, typer.Argument(metavar="DIR", help="Folder with a finished PEM.", show_default=False)
 ]
+Place = Annotated[str, typer.Argument(metavar="DIR", help="Folder or URL with a PEM.", show_default=False)]
 Views = Annotated[
     int | None,
     typer.Option("--views", metavar="N", help="Number of views on the arc. [default: views.count]"),

@@ -9,15 +9,16 @@ import typer
 
 from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
-from mirrorbake.commands.options import Folder, Threads
+from mirrorbake.commands.options import Place, Threads
 from mirrorbake.commands.progress import messages, progress
 
 
 @reports_errors
 def report_command(
-    directory: Folder,
+    directory: Place,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="The page. [default: DIR/report.html]")
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="The page. [default: DIR/report.html; of a URL none]"),
     ] = None,
     threads: Threads = 0,
 ) -> None:

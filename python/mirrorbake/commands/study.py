@@ -55,9 +55,18 @@ def scene_command(
         str, typer.Option("--axes", metavar="A,B,…", help="Choices to study, by name. [default: all]")
     ] = "",
     minutes: Annotated[
-        float | None,
-        typer.Option("--minutes", min=0.0, metavar="M", help="No trial begins later. [default: no limit]"),
-    ] = None,
+        float, typer.Option("--minutes", min=0.0, metavar="M", help="No trial begins later.")
+    ] = 15.0,
+    pixels: Annotated[
+        int,
+        typer.Option(
+            "--pixels",
+            min=16,
+            max=16384,
+            metavar="N",
+            help="Longest side of pictures; maps shrink with them.",
+        ),
+    ] = 160,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for results; goes on with a study in it.")
     ] = Path("out/study"),
@@ -76,7 +85,7 @@ def scene_command(
     config = scene_config(scene, assignments, None, None, None, None, seed)
     names = [name.strip() for name in axes.split(",") if name.strip()]
     with _core.ThreadLimit(threads), progress() as add_bar:
-        result = study(config, out, names, minutes, add_bar("study"))
+        result = study(config, out, names, minutes, add_bar("study"), longest_side=pixels)
     show.plot(result, out / show.PLOT_NAME)
     if json:
         typer.echo(json_module.dumps(show.as_json(result)))

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from mirrorbake.errors import InputError
+from mirrorbake.errors import StoreError
 from mirrorbake.evaluate.contenders import (
     CONTENDERS,
     MAIN_RUN_TIME,
@@ -37,13 +36,13 @@ from mirrorbake.evaluate.references import (
     object_window,
     refined_reference,
 )
-from mirrorbake.files import write_text
+from mirrorbake.pem.location import Location
 from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.store import PemStore
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
-    from os import PathLike
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -200,7 +199,7 @@ class Onlooker:
         self._run_times = run_times
         self._margin = margin
         self.cache = ReferenceCache(
-            references or pem.store.directory / REFERENCES_NAME,
+            references or pem.store.location.joined(REFERENCES_NAME),
             pem.store.header.source,
             pem.store.header.plan.depth,
         )
@@ -231,7 +230,7 @@ class Onlooker:
 
 
 def evaluate(
-    directory: str | PathLike[str],
+    directory: Location | Path | str,
     progress: ProgressReport | None = None,
     stage: Stage | None = None,
     *,
@@ -246,7 +245,8 @@ def evaluate(
     Parameters
     ----------
     directory
-        Holds a complete PEM. If it cannot be written to, the figures are returned all the same.
+        A folder or URL with a complete PEM. If it cannot be written to, as nothing behind `https://` can, the
+        figures are returned all the same.
     progress
         Told about every view.
     stage
@@ -261,11 +261,11 @@ def evaluate(
     StoreError
         As `open_pem` raises it.
     """
-    directory = Path(directory)
+    location = Location.of(directory)
     report = progress or (lambda done, total, text: None)
-    count = len(PemStore.open(directory).header.space)
+    count = len(PemStore.open(location).header.space)
     report(0, count, "preparing the scene")
-    pem = open_pem(directory, stage)
+    pem = open_pem(location, stage)
     onlooker = Onlooker(pem)
     views = choose_views(pem.stage.built.cameras, pem.space, every=every_view)
     figures: list[ViewFigures] = []
@@ -297,8 +297,8 @@ def evaluate(
         notes,
     )
     try:
-        write_text(directory / METRICS_NAME, evaluation.to_json())
-    except InputError as failure:
+        location.joined(METRICS_NAME).write_bytes(evaluation.to_json().encode())
+    except StoreError as failure:
         notes.append(str(failure))
         return evaluation
     return replace(evaluation, written=True)

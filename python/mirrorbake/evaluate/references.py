@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import math
 import time
@@ -13,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.errors import StoreError
 from mirrorbake.evaluate.metrics import decibels, mean_squared_error
-from mirrorbake.files import atomic_output
+from mirrorbake.pem.location import Location
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
 from mirrorbake.scene.config_axes import SCENE_AXES
 
@@ -206,8 +208,8 @@ class ReferenceCache:
     A folder that cannot be written to leaves the references in memory alone; `problem` then says why.
     """
 
-    def __init__(self, folder: Path, source: Source, depth: int) -> None:
-        self._folder = folder
+    def __init__(self, folder: Location | Path, source: Source, depth: int) -> None:
+        self._folder = Location.of(folder)
         config: Mapping[str, Any] = source.config
         content = {section: config.get(section) for section in _LIGHT_SECTIONS}
         # The content of a file counts, not its name.
@@ -219,20 +221,22 @@ class ReferenceCache:
         self._light = [source.library, content, files, trace, depth]
         self.problem: str | None = None
 
-    def path(self, camera: _core.Camera, window: Window, scene: Mapping[str, float] | None = None) -> Path:
+    def place(
+        self, camera: _core.Camera, window: Window, scene: Mapping[str, float] | None = None
+    ) -> Location:
         """Where the reference of a view is, or would be; `scene`: its coordinates that change the scene."""
         place = [list(camera.eye), list(camera.target), list(camera.up)]
         frame = [camera.vertical_fov_degrees, camera.width, camera.height, *window]
         text = json.dumps([self._light, place, frame, dict(scene or {})])
-        return self._folder / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.npz"
+        return self._folder.joined(f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.npz")
 
     def load(
         self, camera: _core.Camera, window: Window, scene: Mapping[str, float] | None = None
     ) -> Reference | None:
         """The reference of a view; None if there is none, or it cannot be read."""
-        path = self.path(camera, window, scene)
+        place = self.place(camera, window, scene)
         try:
-            with np.load(path) as file:
+            with np.load(io.BytesIO(place.read_bytes())) as file:
                 first, second = (
                     Half(*(file[f"{name}_{number}"].astype(np.float64) for name in _HALF))
                     for number in (0, 1)
@@ -253,11 +257,11 @@ class ReferenceCache:
             for name in _HALF
         }
         about = np.array([reference.samples, reference.batches, reference.seconds])
+        packed = io.BytesIO()
+        np.savez(packed, allow_pickle=False, about=about, **arrays)
         try:
-            self._folder.mkdir(exist_ok=True)
-            with atomic_output(self.path(camera, reference.window, scene)) as temporary:
-                np.savez(temporary, allow_pickle=False, about=about, **arrays)
-        except OSError as failure:
+            self.place(camera, reference.window, scene).write_bytes(packed.getvalue())
+        except StoreError as failure:
             self.problem = str(failure)
 
 

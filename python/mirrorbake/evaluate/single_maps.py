@@ -125,7 +125,7 @@ def layer_on_surface(pem: OpenedPem) -> Layer | None:
     def placed(stage: Stage, samples: _core.SurfaceSamples) -> _core.SurfaceSamples:
         return _core.with_vertex_lookups(samples, stage.built.positions, built.triangles, coordinates)
 
-    texels = len(header.maps) * header.topology.texels
+    texels = sum(topology.texels for topology in header.topologies)
     # All levels of a square atlas have a third more texels than the finest.
     side = 1 << max((3 * texels // 4).bit_length() - 1, 0) // 2
     return Layer(

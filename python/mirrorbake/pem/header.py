@@ -111,7 +111,7 @@ class Header:
     projection: Projection
     """Of all maps."""
     map_size: int
-    """Texels along a side of a face of the finest level."""
+    """Texels along a side of a face of the finest level of the largest map."""
     precision: Literal["float16", "float32"]
     image_size: tuple[int, int]
     """Pixels: width, height."""
@@ -137,7 +137,7 @@ class Header:
                 "world": "right-handed, +Y up, metres; positions are relative to `origin`",
                 "radiance": "scene-linear, Rec.709 primaries",
                 "faces": _FACES[self.projection],
-                "texels": "finest level (face, row, column), then the residuals of the coarser levels",
+                "texels": "finest level (face, row, column), then residuals of the coarser levels, then 0",
                 "residuals": "level l = mean of 2x2 blocks of level l-1, from the finest down, plus residual",
                 "level_sizes": [self.map_size, *coarser_sizes(self.map_size)],
                 "shells": "front to back, L = L0 + (1 - a0)(L1 + (1 - a1)(...)); RGBA premultiplied by a",
@@ -196,8 +196,19 @@ class Header:
 
     @property
     def topology(self) -> _core.TexelTopology:
-        """How the texels of a map lie to each other."""
+        """How the texels of the largest map lie to each other."""
         return topology_of(self.projection, self.map_size)
+
+    @property
+    def topologies(self) -> list[_core.TexelTopology]:
+        """How the texels of each map lie to each other."""
+        return [topology_of(self.projection, entry.size) for entry in self.maps]
+
+    @property
+    def sizes_in_words(self) -> str:
+        """Texels of the maps' faces: `256²`, or `64² to 256²`."""
+        sizes = sorted({entry.size for entry in self.maps})
+        return f"{sizes[0]}²" if len(sizes) == 1 else f"{sizes[0]}² to {sizes[-1]}²"
 
     @property
     def is_static_set(self) -> bool:

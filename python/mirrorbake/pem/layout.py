@@ -9,7 +9,7 @@ import numpy as np
 import zarr
 from zarr.codecs import BloscCodec, BloscShuffle, Crc32cCodec
 
-from mirrorbake.pem.pyramid import LARGEST_HALF, join_pyramid, split_pyramid
+from mirrorbake.pem.pyramid import LARGEST_HALF, join_pyramid, residual_texels, split_pyramid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,8 +69,8 @@ class Contents:
     """
     local_triangles: NDArray[np.uint8] | None
     """Shape (T,), 0 for triangles of the reflector that shells for `off hull` leave out; None: for none."""
-    static_maps: FloatArray | None = None
-    """The static set, (M, T, 4): pyramids of all maps, premultiplied radiance and α; None: there is none."""
+    static_maps: tuple[FloatArray, ...] | None = None
+    """The static set: of each map its pyramid (T, 4), premultiplied radiance and α; None: there is none."""
     lit_sides: int = 1
     """1 if diffuse light falls on the fronts of triangles alone, 2 if on their backs, too."""
 
@@ -172,7 +172,10 @@ def fill_group(store: Store, contents: Contents) -> None:
         if not header.space.changes_scene:
             array[...] = irradiance
     if contents.static_maps is not None:
-        stored = np.stack([stored_map(pyramid, header)[0] for pyramid in contents.static_maps])
+        stored = np.zeros((len(header.maps), header.topology.texels, 4), header.precision)
+        for number, pyramid in enumerate(contents.static_maps):
+            values, _ = stored_map(pyramid, header.maps[number].size, header)
+            stored[number, : len(values)] = values
         chunk = (1, *stored.shape[1:])
         _make(group, "static/maps", stored, ("map", "texel", "channel"), chunk)[...] = stored
     if local_triangles is not None:
@@ -198,17 +201,18 @@ def _make(
     )
 
 
-def stored_map(pyramid: FloatArray, header: Header) -> tuple[NDArray[Any], int]:
-    """Return a pyramid as `maps` holds it, (T, C), and how many values were clamped."""
-    finest, residuals, clamped = split_pyramid(pyramid, header.map_size, header.precision, header.faces)
+def stored_map(pyramid: FloatArray, size: int, header: Header) -> tuple[NDArray[Any], int]:
+    """Return a pyramid of a size as `maps` begins with it, (T, C), and how many values were clamped."""
+    finest, residuals, clamped = split_pyramid(pyramid, size, header.precision, header.faces)
     return np.concatenate([finest.reshape(-1, finest.shape[-1]), residuals]), clamped
 
 
-def read_back(stored: NDArray[Any], header: Header) -> FloatArray:
-    """Inverse of `stored_map`, up to the rounding of the storage."""
-    count = header.faces * header.map_size**2
-    shape = (header.faces, header.map_size, header.map_size, stored.shape[-1])
-    return join_pyramid(stored[:count].reshape(shape), stored[count:])
+def read_back(stored: NDArray[Any], size: int, header: Header) -> FloatArray:
+    """Inverse of `stored_map`, up to the rounding of the storage; what is stored may be longer."""
+    count = header.faces * size**2
+    shape = (header.faces, size, size, stored.shape[-1])
+    end = count + residual_texels(size, header.faces)
+    return join_pyramid(stored[:count].reshape(shape), stored[count:end])
 
 
 def stored_images(images: ViewImages, precision: str) -> tuple[NDArray[Any], int]:

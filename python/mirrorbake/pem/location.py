@@ -15,6 +15,7 @@ import zarr.storage
 from zarr.core.sync import sync
 
 from mirrorbake.errors import StoreError
+from mirrorbake.files import atomic_output
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -78,6 +79,58 @@ class Location:
                 f"{self.text}: cannot open: {failure} (URLs need `pip install mirrorbake[remote]`)"
             ) from None
 
+    def joined(self, name: str) -> Location:
+        """Return a file or folder within it."""
+        return (
+            Location(f"{self.text.rstrip('/')}/{name}") if self.is_remote else Location(str(self.path / name))
+        )
+
+    def read_bytes(self) -> bytes:
+        """Return the content of the file that this is.
+
+        Raises
+        ------
+        StoreError
+            There is none, or it cannot be read.
+        """
+        try:
+            if not self.is_remote:
+                return self.path.read_bytes()
+            system, name = self._file_system()
+            return bytes(system.cat_file(name))
+        # What it raises depends on the kind of URL.
+        except Exception as failure:
+            raise StoreError(f"{self.text}: cannot read: {failure}") from None
+
+    def write_bytes(self, content: bytes) -> None:
+        """Make the file that this is, complete or not at all, and the folder that it is in.
+
+        Raises
+        ------
+        StoreError
+            It cannot be written, as nothing behind `https://` can.
+        """
+        try:
+            if self.is_remote:
+                system, name = self._file_system()
+                system.pipe_file(name, content)
+                return
+            self.path.parent.mkdir(exist_ok=True)
+            with atomic_output(self.path) as temporary:
+                temporary.write_bytes(content)
+        # As above; NotImplementedError has no words of its own.
+        except Exception as failure:
+            words = getattr(failure, "strerror", None) or str(failure)
+            raise StoreError(f"{self.text}: cannot write: {words or 'such URLs are only read'}") from None
+
+    def _file_system(self) -> tuple[Any, str]:
+        """Return what fsspec has for a URL, and the name within it."""
+        # An optional dependency, which URLs alone need.
+        from fsspec.core import url_to_fs
+
+        system, name = url_to_fs(self.text)
+        return system, name
+
     def exists(self) -> bool:
         """Whether there is a PEM, complete or not."""
         if not self.is_remote:
@@ -113,6 +166,11 @@ def list_keys(store: Store, prefix: str) -> list[str]:
 def delete_key(store: Store, key: str) -> None:
     """Remove an object, if it is there."""
     sync(store.delete(key))
+
+
+def bytes_under(store: Store, prefix: str) -> int:
+    """Size of all objects whose key starts so."""
+    return sum(stored_bytes(store, key) for key in list_keys(store, prefix))
 
 
 def stored_bytes(store: Store, key: str) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -70,6 +71,20 @@ def decimate(level: FloatArray) -> FloatArray:
     top = level[:, 0::2, 0::2] + level[:, 0::2, 1::2]
     bottom = level[:, 1::2, 0::2] + level[:, 1::2, 1::2]
     return (top + bottom) * np.float32(0.25)
+
+
+def coarse_end(pyramid: FloatArray, texels: int) -> FloatArray:
+    """Return the levels of a pyramid (T, C) that a smaller one of so many texels has."""
+    return pyramid[len(pyramid) - texels :]
+
+
+def size_of(texels: int, faces: int = 6) -> int:
+    """Return the side of the finest level of a pyramid of so many texels.
+
+    >>> size_of(6 * (16 + 4 + 1)), size_of(2 * (4 + 1), faces=2)
+    (4, 2)
+    """
+    return math.isqrt((3 * (texels // faces) + 1) // 4)
 
 
 def residual_texels(size: int, faces: int = 6) -> int:

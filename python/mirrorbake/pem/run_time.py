@@ -9,7 +9,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.errors import StoreError
-from mirrorbake.pem.pyramid import pyramid_of
+from mirrorbake.pem.pyramid import pyramid_of, topology_of
 from mirrorbake.proxy import proxy_from_attributes
 from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.load import parse_config
@@ -85,7 +85,7 @@ def shell_maps(
         [
             _core.ShellMap(
                 shell.proxy_at(pose),
-                header.topology,
+                topology_of(header.projection, shell.size),
                 read(part.name, shell.name),
                 local_triangles if shell.polygons == "off hull" else None,
             )
@@ -240,7 +240,7 @@ class RunTime:
         found = {}
         for name in self._header.map_names():
             number = self._header.map_of(*name)
-            texels = np.ascontiguousarray(stored[number, :, : self._header.maps[number].channels])
+            texels = np.ascontiguousarray(stored[number][:, : self._header.maps[number].channels])
             found[name] = texels if self.remap is None else self.remap(texels)
         return found
 

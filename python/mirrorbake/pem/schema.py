@@ -16,7 +16,7 @@ from mirrorbake.proxy import SHAPES, proxy_from_attributes
 from mirrorbake.scene.config_shells import ShellRule
 from mirrorbake.scene.config_values import MAX_IMAGE_SIDE, MAX_MAP_SIZE
 
-FORMAT_VERSION = 5
+FORMAT_VERSION = 6
 MAX_SAMPLES = 100_000_000
 MAX_PARTS = 65535
 
@@ -82,6 +82,7 @@ class ShellAttributes(_Model):
     map: Annotated[str, Field(min_length=1, max_length=2000)]
     polygons: Literal["all", "off hull"]
     moves: bool
+    size: Annotated[int, Field(ge=1, le=MAX_MAP_SIZE)]
 
 
 class PartAttributes(_Model):
@@ -96,6 +97,7 @@ class MapAttributes(_Model):
 
     name: Annotated[str, Field(min_length=1, max_length=2000)]
     channels: Literal[3, 4]
+    size: Annotated[int, Field(ge=1, le=MAX_MAP_SIZE)]
 
 
 class FadeAttributes(_Model):
@@ -124,7 +126,7 @@ class Attributes(_Model):
     """All of the group's attribute."""
 
     format: Literal["pem"]
-    format_version: Literal[5]
+    format_version: Literal[6]
     library: Annotated[str, Field(max_length=100)]
     fingerprint: Sha256
     conventions: dict[str, Any]
@@ -150,14 +152,17 @@ class Attributes(_Model):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Attributes:
-        if self.map_size & (self.map_size - 1):
-            raise ValueError(f"map_size = {self.map_size}: should be a power of two")
+        for size in (self.map_size, *(entry.size for entry in self.maps)):
+            if size & (size - 1):
+                raise ValueError(f"a map of {size} texels: should be a power of two")
+        if self.map_size != max(entry.size for entry in self.maps):
+            raise ValueError(f"map_size = {self.map_size}: should be that of the largest map")
         count = 1
         for axis in self.space:
             count *= len(axis.values)
         if count > MAX_SAMPLES:
             raise ValueError(f"the space has {count} samples, at most {MAX_SAMPLES} are possible")
-        known = {entry.name: entry.channels for entry in self.maps}
+        known = {entry.name: (entry.channels, entry.size) for entry in self.maps}
         rules = [rule.name for rule in self.shells]
         if len(set(rules)) < len(rules):
             raise ValueError("shells: two of one name")
@@ -168,7 +173,8 @@ class Attributes(_Model):
                     f"part {part.name}: its shells are not some of {', '.join(rules)} with the last"
                 )
             for shell in part.shells:
-                if known.get(shell.map) != (3 if shell is part.shells[-1] else 4):
+                channels = 3 if shell is part.shells[-1] else 4
+                if known.get(shell.map) != (channels, shell.size):
                     raise ValueError(f"shell {shell.name} of {part.name}: no such map: {shell.map}")
         return self
 

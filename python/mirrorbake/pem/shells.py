@@ -29,6 +29,8 @@ class Shell:
     """As `mirrorbake.proxy.proxy_to_attributes` returns it, with the object at rest."""
     map: str
     """Name of the map that lies on it; parts may share one."""
+    size: int
+    """Texels along a side of a face of the map's finest level."""
     polygons: HullPolygons
     """Whether polygons on the object's convex hull read it."""
     moves: bool
@@ -59,6 +61,8 @@ class MapEntry:
     name: str
     channels: Literal[3, 4]
     """RGB, or RGBA premultiplied by α."""
+    size: int
+    """Texels along a side of a face of the finest level."""
 
 
 def maps_of(parts: tuple[Part, ...]) -> tuple[MapEntry, ...]:
@@ -67,9 +71,13 @@ def maps_of(parts: tuple[Part, ...]) -> tuple[MapEntry, ...]:
     for part in parts:
         for shell in part.shells:
             channels: Literal[3, 4] = 3 if shell is part.shells[-1] else 4
-            entry = entries.setdefault(shell.map, MapEntry(shell.map, channels))
+            entry = entries.setdefault(shell.map, MapEntry(shell.map, channels, shell.size))
             if entry.channels != channels:
                 raise ValueError(f"map {shell.map}: is the last shell of one part and not of another")
+            if entry.size != shell.size:
+                raise ValueError(
+                    f"map {shell.map}: has {entry.size} texels in one part and {shell.size} in another"
+                )
     return tuple(entries.values())
 
 

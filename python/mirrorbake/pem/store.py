@@ -5,7 +5,7 @@
 ===================== =============== ================================================================
 array                 shape           holds
 ===================== =============== ================================================================
-`maps`                (N, M, T, C)    every map of a sample: finest level, then residuals of the others
+`maps`                (N, M, T, C)    every map of a sample: finest level, residuals of the others, then 0
 `reference`           (N, H, W, 7)    ray traced: object R G B, its coverage, background R G B
 `record`              (N, K)          seconds, clamped values and the solver's report. Written last
 `diffuse/irradiance`  (1|N, V, 3|6)   W m⁻² at the object's vertices: on fronts, and on backs if lit
@@ -266,8 +266,8 @@ class PemStore:
             self.forget(index)
             for name in header.map_names():
                 number = header.map_of(*name)
-                values, count = stored_map(maps[name], header)
-                texels[number, :, : values.shape[1]] = values
+                values, count = stored_map(maps[name], header.maps[number].size, header)
+                texels[number, : len(values), : values.shape[1]], texels[number, len(values) :] = values, 0
                 clamped += count
                 report = (reports or {}).get(name, SolverReport(0, 0.0, True))
                 start = len(RECORD) + number * len(MAP_RECORD)
@@ -302,8 +302,8 @@ class PemStore:
     def read_map(self, part: str, layer: str, index: int) -> FloatArray:
         """Pyramid of the map of a part's shell in one sample, shape (texels, C), float32."""
         number = self.header.map_of(part, layer)
-        channels = self.header.maps[number].channels
-        return read_back(self._read("maps", (index, number))[:, :channels], self.header)
+        entry = self.header.maps[number]
+        return read_back(self._read("maps", (index, number))[:, : entry.channels], entry.size, self.header)
 
     def read_images(self, index: int) -> ViewImages:
         """Ray-traced images of one sample."""
@@ -336,11 +336,12 @@ class PemStore:
         """Finest level of the static map, shape (F, S, S, 3)."""
         return self._read("static/capture").astype(np.float32)
 
-    def read_static_maps(self) -> FloatArray | None:
-        """The static set: pyramids (M, texels, 4) of all maps; None if there is none."""
+    def read_static_maps(self) -> tuple[FloatArray, ...] | None:
+        """The static set: pyramids (texels, 4) of all maps; None if there is none."""
         if not self._has("static/maps"):
             return None
-        return np.stack([read_back(pyramid, self.header) for pyramid in self._read("static/maps")])
+        sizes = [entry.size for entry in self.header.maps]
+        return tuple(map(read_back, self._read("static/maps"), sizes, [self.header] * len(sizes)))
 
     def read_irradiance(self, index: int = 0) -> FloatArray | None:
         """Irradiance at the object's vertices in one sample, shape (V, 3), or (V, 6) with backs; or None."""

@@ -13,8 +13,11 @@ from mirrorbake.scene.config_values import Section, as_tuple, one_of
 ITSELF = "itself"
 """Name of the reflector among the objects of a shell."""
 
-ShellShape: TypeAlias = Annotated[str, one_of("auto", "plane", *FAMILIES)]
-"""Geometry of a shell; "auto" fits what its rays meet, and an ellipsoid about each part for `itself`."""
+ENCLOSING = "enclosing ellipsoid"
+"""The smallest about each part, for `itself` alone."""
+
+ShellShape: TypeAlias = Annotated[str, one_of("auto", "plane", *FAMILIES, ENCLOSING)]
+"""Geometry of a shell; "auto" fits what its rays meet, for each part apart for `itself`."""
 
 
 class ShellRule(Section):
@@ -80,6 +83,12 @@ def check_shells(shells: Shells) -> None:
             f"shells: the last, {shells[-1].name!r}, holds some things alone; expected one that takes the "
             "rest, without `objects` and `nearer_than`"
         )
+    for shell in shells:
+        if shell.proxy == ENCLOSING and not shell.is_itself:
+            raise ValueError(
+                f"shells: {shell.name!r}: proxy = {ENCLOSING!r} is about the object; "
+                f"expected objects = [{ITSELF!r}] with it, or another proxy"
+            )
     if shells[-1].proxy == "plane":
         raise ValueError(
             f"shells: the last, {shells[-1].name!r}, holds the background too, which is on no plane; "

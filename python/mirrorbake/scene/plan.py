@@ -22,15 +22,16 @@ DECIDED_KEYS = (
     "layers.local",
     "layers.hull_split",
     "maps.distant",
-    "maps.size",
     "maps.shared_distant",
+    "maps.size",
     "trace.noise",
     "views.traced",
     "infer.passes",
     "infer.neighbours",
     "static.views",
 )
-"""Keys of a scene file that may be "auto", in the order in which they are decided."""
+"""Keys of a scene file that may be "auto", in the order in which they are decided. Shells before the last
+have decisions on `shells.proxy`, too."""
 
 
 USUAL_WEIGHT = 3e-4
@@ -57,7 +58,7 @@ class Decision:
     """The value of one key, and why."""
 
     key: str
-    """Of the scene file: one of `DECIDED_KEYS`."""
+    """Of the scene file: one of `DECIDED_KEYS`, or `shells.proxy`, the geometry of a shell."""
     part: str | None
     """The part of the reflector that it is about; None: all."""
     value: DecisionValue
@@ -67,6 +68,8 @@ class Decision:
     """With the number that was measured, for people."""
     measured: float | None
     """That number alone, in the unit of the reason (a share for per cent); None: nothing was measured."""
+    shell: str | None = None
+    """The shell whose maps it is about; None: all."""
 
     def __str__(self) -> str:
         """Return the line of a scene file that sets the value, with the reason as its comment.
@@ -75,11 +78,13 @@ class Decision:
         'maps.size = 256  # set in the scene'
         >>> str(Decision("layers.local", "lid", True, True, "it reflects itself", 0.1))
         'layers.local = true  # lid: it reflects itself'
+        >>> str(Decision("maps.size", "lid", 64, True, "it is strongly curved", 0.1, "local"))
+        'maps.size = 64  # lid/local: it is strongly curved'
         >>> str(Decision("shells", None, [{"name": "all"}], True, "it sees the sky alone", None))
         'shells = [{ name = "all" }]  # it sees the sky alone'
         """
-        part = f"{self.part}: " if self.part is not None else ""
-        return f"{self.key} = {_toml(self.value)}  # {part}{self.reason}"
+        about = "/".join(name for name in (self.part, self.shell) if name is not None)
+        return f"{self.key} = {_toml(self.value)}  # {about}{': ' if about else ''}{self.reason}"
 
 
 def _toml(value: DecisionValue) -> str:
@@ -95,10 +100,8 @@ class PlannedShell:
     """A shell of a bake."""
 
     name: str
-    proxy: dict[str, Any] | None
-    """As in a PEM's attributes; None: an ellipsoid about each part of the object."""
-    parts: tuple[str, ...]
-    """Parts of the reflector that have a map of it."""
+    proxies: dict[str, dict[str, Any]]
+    """Its geometry for each part of the reflector that has a map of it, as in a PEM's attributes."""
 
 
 @dataclass(frozen=True)
@@ -113,10 +116,10 @@ class Plan:
     advice: tuple[str, ...] = ()
     """What was measured of choices that are the user's: whether a PEM is worth it, and what would do."""
 
-    def value(self, key: str, part: str | None = None) -> DecisionValue:
+    def value(self, key: str, part: str | None = None, shell: str | None = None) -> DecisionValue:
         """Return what was decided; KeyError for what was not."""
         for decision in self.decisions:
-            if decision.key == key and decision.part in (None, part):
+            if decision.key == key and decision.part in (None, part) and decision.shell in (None, shell):
                 return decision.value
         raise KeyError(key)
 
@@ -132,8 +135,12 @@ class Plan:
 
     @property
     def map_size(self) -> int:
-        """Texels along a side of a cube face."""
-        return cast("int", self.value("maps.size"))
+        """Texels along a side of a face of the largest map."""
+        return max(cast("int", decision.value) for decision in self.decisions if decision.key == "maps.size")
+
+    def size_of(self, part: str, shell: str) -> int:
+        """Texels along a side of a face of a map."""
+        return cast("int", self.value("maps.size", part, shell))
 
     @property
     def has_diffuse(self) -> bool:
@@ -187,7 +194,7 @@ class Plan:
         return {
             "decisions": [asdict(decision) for decision in self.decisions],
             "distant": self.distant,
-            "shells": [asdict(shell) | {"parts": list(shell.parts)} for shell in self.shells],
+            "shells": [asdict(shell) for shell in self.shells],
             "advice": list(self.advice),
         }
 
@@ -197,9 +204,7 @@ class Plan:
         plan = Plan(
             tuple(Decision(**decision) for decision in data["decisions"]),
             data["distant"],
-            tuple(
-                PlannedShell(shell["name"], shell["proxy"], tuple(shell["parts"])) for shell in data["shells"]
-            ),
+            tuple(PlannedShell(**shell) for shell in data["shells"]),
             tuple(data["advice"]),
         )
         for key in DECIDED_KEYS:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,8 @@ from mirrorbake import fresnel, projection
 from mirrorbake.evaluate.metrics import display_referred, psnr
 from mirrorbake.files import write_text
 from mirrorbake.pem.pyramid import join_pyramid, split_pyramid
+from mirrorbake.study.accuracy_light import accuracy_of_light
+from mirrorbake.study.accuracy_row import Accuracy
 from mirrorbake.study.fresnel import INDICES, rounding
 from mirrorbake.study.lobes import dark_room, lobe_errors, lobes, sunny_sky
 from mirrorbake.study.proxy import proxy_errors
@@ -31,19 +32,6 @@ SINGULAR = {"angular", "sphere_map"}
 """Projections with one direction, away from the front, that becomes a circle."""
 
 
-@dataclass(frozen=True)
-class Accuracy:
-    """The largest error of a function over a domain."""
-
-    function: str
-    domain: str
-    against: str
-    unit: str
-    error: float
-    bound: float
-    """What the error may be: asserted by the tests."""
-
-
 def accuracy(cosines: int = 60, rays: int = 6) -> list[Accuracy]:
     """Measure everything.
 
@@ -54,7 +42,8 @@ def accuracy(cosines: int = 60, rays: int = 6) -> list[Accuracy]:
     rays
         Per shape, flatness and depth of a proxy.
     """
-    return [*_fresnel(cosines), *_proxies(rays), *_projections(), *_prefilter(), *_display(), *_storage()]
+    measured = [_fresnel(cosines), _proxies(rays), _projections(), _prefilter(), _display(), _storage()]
+    return [row for rows in measured for row in rows] + accuracy_of_light()
 
 
 def _fresnel(cosines: int) -> list[Accuracy]:
@@ -236,12 +225,12 @@ and of evaluations has noise, which is
 """
 
 REST = """
-Whole bakes are tested at heights of 1 mm and 1 km, of one triangle and of a needle, at fields of view of 1°
-and 170°, in one pixel, from a grazing view, under black and a million times as bright surroundings; solves
-over regularisers of 1 to 1e-8 (conditions up to 1e8), beside float64, and targets over ten orders of
-magnitude; two million triangles from tracing to the map. A solve that did not reach its tolerance says so
-(`SolveReport.converged`); traced samples that are NaN or infinite are left out, counted
-(`ViewTargets.rejected`) and reported by the bake.
+Whole bakes are tested at heights of 1 mm and 1 km, far from the zero of the world, of one triangle and of a
+needle, at fields of view of 1° and 170°, in one pixel, from a grazing view, under black and a million times
+as bright surroundings; solves over regularisers of 1 to 1e-8 (conditions up to 1e8), beside float64, and
+targets over ten orders of magnitude; two million triangles from tracing to the map. A solve that did not
+reach its tolerance says so (`SolveReport.converged`); traced samples that are NaN or infinite are left out,
+counted (`ViewTargets.rejected`) and reported by the bake.
 """
 
 

@@ -10,6 +10,7 @@ from importlib import metadata, resources
 from typing import TYPE_CHECKING
 
 from mirrorbake import _core
+from mirrorbake.errors import OptionError
 from mirrorbake.evaluate.contenders import RUN_TIMES, TITLES
 from mirrorbake.evaluate.evaluate import Evaluation, SeenView, evaluate, finite
 from mirrorbake.evaluate.metrics import mean_or_none
@@ -17,7 +18,8 @@ from mirrorbake.evaluate.places import PLACE_TITLES
 from mirrorbake.evaluate.report.pictures import Plot, colour, error_url, legend, picture_url
 from mirrorbake.evaluate.table import METRIC_DIGITS, METRIC_TITLES, number, present
 from mirrorbake.files import check_writable, write_text
-from mirrorbake.pem.store import GROUP_NAME, PemStore
+from mirrorbake.pem.location import Location, bytes_under
+from mirrorbake.pem.store import PemStore
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -32,7 +34,7 @@ PICTURED = ("on", "between", "off_5", "above_10", "dome")
 
 
 def report(
-    directory: Path,
+    directory: Location | Path | str,
     out: Path | None = None,
     progress: ProgressReport | None = None,
     stage: Stage | None = None,
@@ -43,15 +45,15 @@ def report(
     Parameters
     ----------
     directory
-        Holds a complete PEM.
+        A folder or URL with a complete PEM.
     out
-        The HTML file; default: `DIR/report.html`.
+        The HTML file; default: `DIR/report.html` of a folder.
     progress
         Told about every view.
     stage
         The PEM's scene, if it has been prepared already.
     sections
-        What makes further sections of a PEM's folder: HTML, or nothing.
+        What makes further sections of a PEM's folder, which a URL is not: HTML, or nothing.
 
     Returns
     -------
@@ -62,10 +64,16 @@ def report(
     ------
     InputError
         It cannot be written to; found out before the evaluation.
+    OptionError
+        The PEM is at a URL, and `out` is not given.
     StoreError
         As `evaluate` raises it.
     """
-    out = out or directory / REPORT_NAME
+    location = Location.of(directory)
+    if out is None:
+        if location.is_remote:
+            raise OptionError(f"{location}: a report is written to this machine; expected --out FILE")
+        out = location.path / REPORT_NAME
     check_writable(out)
     pictured: dict[str, SeenView] = {}
 
@@ -73,15 +81,15 @@ def report(
         if seen.view.place in PICTURED:
             pictured.setdefault(seen.view.place, seen)
 
-    evaluation = evaluate(directory, progress, stage, on_view=keep)
-    store = PemStore.open(directory)
+    evaluation = evaluate(location, progress, stage, on_view=keep)
+    store = PemStore.open(location)
     parts = [
         _head(store, evaluation),
         _table(evaluation),
         _curves(evaluation),
         _pictures(pictured),
         _metrics(evaluation),
-        *(section(directory) for section in sections),
+        *(section(location.path) for section in sections if not location.is_remote),
         _plan(store),
         _cost(store, evaluation),
         _about(store, evaluation),
@@ -117,7 +125,7 @@ def _head(store: PemStore, evaluation: Evaluation) -> str:
     count = len(header.space)
     lines.append(
         f'<p class="soft">{count} view{"s" * (count != 1)} over {abs(views["degrees"]):g}°, {width}×{height} '
-        f"pixels, maps of {header.map_size}²×6 texels with all their levels.</p>"
+        f"pixels, maps of {header.sizes_in_words} ×{header.faces} texels with all their levels.</p>"
     )
     lines += [f'<p class="soft">Note: {html.escape(note)}.</p>' for note in evaluation.notes]
     return "\n".join(lines)
@@ -318,10 +326,6 @@ def _sentence(words: str) -> str:
     return words[:1].upper() + words[1:] + "."
 
 
-def _bytes(path: Path) -> int:
-    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-
-
 def megabytes(count: float) -> str:
     """Words for a number of bytes."""
     return f"{count / 1e6:.3g} MB" if count >= 1e6 else f"{count / 1e3:.3g} kB"
@@ -330,8 +334,8 @@ def megabytes(count: float) -> str:
 def _cost(store: PemStore, evaluation: Evaluation) -> str:
     count = len(store.header.space)
     timings = [store.read_timings(index) for index in range(count)]
-    group = store.directory / GROUP_NAME
-    maps, whole = _bytes(group / "maps"), _bytes(group)
+    objects = store.location.store(writable=False)
+    maps, whole = bytes_under(objects, "maps/"), bytes_under(objects, "")
     rows = [
         ("tracing", f"{sum(t.trace_s for t in timings) / count:.2f} s a view"),
         ("building matrices", f"{sum(t.build_s for t in timings) / count:.2f} s a view"),

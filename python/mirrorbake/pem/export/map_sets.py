@@ -156,7 +156,7 @@ def _parts(
         made = ShellMap(
             shell.name,
             proxy_of(shell),
-            header.map_size,
+            shell.size,
             read(header.map_of(part, shell.name)),
             header.projection,
             off_hull=shell.polygons == "off hull",

@@ -36,20 +36,21 @@ def texels_read(pem: OpenedPem, sample: int) -> list[NDArray[np.bool_]]:
     numbers = {entry.name: number for number, entry in enumerate(header.maps)}
     local = pem.store.read_local_triangles()
     config = stage.config
-    read = [np.zeros(header.topology.texels) for _ in header.maps]
+    topologies = header.topologies
+    read = [np.zeros(topology.texels) for topology in topologies]
     for point, camera in _views(pem, sample):
         here = stage.at(point)
         pose = arranged(config, header.space.scene_coordinates(point)).pose
         seen = here.tracer.trace_visibility(camera, here.built.reflector, here.options, pem.run_time.places)
         for number, part in enumerate(header.parts):
             for shell in part.shells:
+                its_map = numbers[shell.map]
+                topology = topologies[its_map]
                 off_hull = local if shell.polygons == "off hull" else None
                 matrix = _core.build_rendering_matrix(
-                    seen, number, shell.proxy_at(pose), header.topology, pem.run_time.model, off_hull
+                    seen, number, shell.proxy_at(pose), topology, pem.run_time.model, off_hull
                 )
-                read[numbers[shell.map]] += np.bincount(
-                    matrix.texels, np.abs(matrix.weights), header.topology.texels
-                )
+                read[its_map] += np.bincount(matrix.texels, np.abs(matrix.weights), topology.texels)
     return [weights > LEAST_READ for weights in read]
 
 

@@ -153,7 +153,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
         space=header.space,
         motion=_motion(header.source.config),
         projection=header.projection,
-        maps=tuple(MapEntry(entry.name, header.map_size, entry.channels == 3) for entry in header.maps),
+        maps=tuple(MapEntry(entry.name, entry.size, entry.channels == 3) for entry in header.maps),
         pyramid=pyramid,
         static_maps=static_maps,
         # The one sample of a PEM without parameters is drawn from everywhere.

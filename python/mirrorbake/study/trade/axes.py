@@ -95,6 +95,14 @@ def _sizes(own: int) -> list[int]:
     return [size for size in (own // 4, own // 2, own * 2) if 4 <= size <= LARGEST_MAP]
 
 
+def _size(config: SceneConfig) -> Axis:
+    own = config.maps.size
+    assert own is not None, "the study decides it"
+    settings = [Setting(str(own)), Setting("for each part", {"maps.size": "auto"})]
+    settings += [Setting(str(size), {"maps.size": size}) for size in _sizes(own)]
+    return Axis("size", "texels along a face", tuple(settings))
+
+
 def _samples(own: int) -> list[int]:
     wanted = (max(own // 4, FEWEST_SAMPLES), own * 4)
     return [samples for samples in wanted if FEWEST_SAMPLES <= samples <= MOST_SAMPLES]
@@ -203,7 +211,7 @@ def _fresnel(stage: Stage) -> Axis | None:
 _SHAPES = ["infinite", "sphere", "box", "ellipsoid"]
 
 _AXES: tuple[Callable[[SceneConfig], Axis | None], ...] = (
-    _of_key("size", "texels along a face", "maps.size", _sizes),
+    _size,
     _levels,
     _prefilter,
     _storage,

@@ -83,7 +83,10 @@ class Measurements:
 
     def __init__(self, bench: Bench, notebook: Notebook, began: float, minutes: float | None) -> None:
         self.bench, self.notebook = bench, notebook
-        self.end = None if minutes is None else began + 60.0 * minutes
+        self.began = began
+        self.minutes = minutes
+        self.share = 1.0
+        """Of the time, that trials may take up to now."""
         self.seconds: list[float] = []
         self.count = 0
 
@@ -98,7 +101,9 @@ class Measurements:
     def _is_late(self) -> bool:
         # The first trial, that of the scene as it is, runs in any case.
         expected = max(self.seconds[-5:], default=0.0)
-        return self.end is not None and self.count > 0 and time.monotonic() + expected > self.end
+        if self.minutes is None or self.count == 0:
+            return False
+        return time.monotonic() + expected > self.began + 60.0 * self.share * self.minutes
 
     def _measure(self, settings: Mapping[str, Setting]) -> Trial | None:
         start = time.monotonic()

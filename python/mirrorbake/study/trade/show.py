@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import html
 import json
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from rich.table import Table
 
 from mirrorbake.evaluate.report.pictures import Plot
@@ -17,6 +19,8 @@ from mirrorbake.study.trade.study import STUDY_NAME, Study, summary
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from matplotlib.axes import Axes
 
     from mirrorbake.study.trade.trial import Trial
 
@@ -28,6 +32,8 @@ COST_TITLES = {
 }
 SHOWN_COSTS = ("bytes_per_degree", "bake_s", "draw_ms")
 OWN = "the scene's own"
+KEY_LINE, KEY_WIDTH = 0.19, 78
+"""Height of a line of the list below a plot, in inches, and characters that it has."""
 
 
 def words_of(trial: Trial) -> str:
@@ -92,48 +98,67 @@ def tables(result: Study) -> list[Table]:
 
 
 def plot(result: Study, path: Path) -> None:
-    """Write a PNG: error against bytes, the time to bake and the time to draw, with the fronts marked."""
+    """Write a PNG: error against bytes, the time to bake and the time to draw, with the fronts marked.
+
+    The steps of a front are numbered; what they stand for is listed below.
+    """
     style: dict[Any, Any] = {"font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9}
+    keys = [_key(result.front(cost)) for cost in SHOWN_COSTS]
+    lines = max(text.count("\n") + 1 for text in keys)
     with mpl.rc_context(style):
-        figure = Figure(figsize=(15, 4.6), layout="constrained")
-        for axes, cost in zip(figure.subplots(1, len(SHOWN_COSTS)), SHOWN_COSTS, strict=True):
-            seen = [trial for trial in result.all if trial.near is not None]
-            single = [trial for trial in seen if len(trial.settings) < 2]
-            combined = [trial for trial in seen if len(trial.settings) > 1]
-            for trials, marker, label in (
-                (single, "o", "one choice changed"),
-                (combined, "^", "combinations"),
-            ):
-                axes.plot(
-                    [getattr(trial, cost) for trial in trials],
-                    [trial.near for trial in trials],
-                    marker,
-                    color="0.65",
-                    markersize=5,
-                    label=label,
-                )
-            front = result.front(cost)
-            costs = [getattr(trial, cost) for trial in front]
-            axes.step(costs, [t.near for t in front], "-o", where="post", color="C0", label="front")
-            for trial in front:
-                axes.annotate(
-                    words_of(trial).replace(", ", "\n"),
-                    (getattr(trial, cost), trial.near or 0.0),
-                    xytext=(4, -4),
-                    textcoords="offset points",
-                    fontsize=6,
-                    va="top",
-                )
-            axes.plot(
-                [getattr(result.base, cost)], [result.base.near], "*", color="C3", markersize=12, label=OWN
-            )
-            axes.set_xscale("log")
-            axes.set_xlabel(COST_TITLES[cost])
-            axes.set_ylabel("PSNR, dB: mean on and between samples")
-            axes.grid(color="0.9")
-        axes.legend(fontsize=8)
+        figure = Figure(figsize=(15, 4.6 + KEY_LINE * lines), layout="constrained")
+        above, below = figure.subplots(2, len(SHOWN_COSTS), height_ratios=(4.6, KEY_LINE * lines))
+        for axes, beneath, cost, text in zip(above, below, SHOWN_COSTS, keys, strict=True):
+            _draw_front(axes, result, cost)
+            beneath.axis("off")
+            beneath.text(0.0, 1.0, text, fontsize=8, va="top", linespacing=1.3, transform=beneath.transAxes)
+        above[-1].legend(fontsize=8, loc="lower right")
         with atomic_output(path) as temporary:
             figure.savefig(temporary, dpi=150, facecolor="white")
+
+
+def _key(front: Sequence[Trial]) -> str:
+    """What the numbers of a front's steps stand for, a few lines."""
+    lines = []
+    for number, trial in enumerate(front, start=1):
+        lines += textwrap.wrap(f"{number}  {words_of(trial)}", KEY_WIDTH, subsequent_indent="     ")
+    return "\n".join(lines)
+
+
+def _draw_front(axes: Axes, result: Study, cost: str) -> None:
+    seen = [trial for trial in result.all if trial.near is not None]
+    single = [trial for trial in seen if len(trial.settings) < 2]
+    combined = [trial for trial in seen if len(trial.settings) > 1]
+    for trials, marker, label in ((single, "o", "one choice changed"), (combined, "^", "combinations")):
+        x, y = _places(trials, cost)
+        axes.plot(x, y, marker, color="0.65", markersize=5, label=label)
+    front = result.front(cost)
+    x, y = _places(front, cost)
+    axes.step(x, y, "-o", where="post", color="C0", label="front")
+    for number, place in enumerate(zip(x, y, strict=True), start=1):
+        # On the left above a step nothing else of the front is.
+        axes.annotate(
+            str(number), place, xytext=(-4, 4), textcoords="offset points", ha="right", weight="bold"
+        )
+    axes.plot(*_places([result.base], cost), "*", color="C3", markersize=12, label=OWN)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value)))
+    low, high = axes.get_xlim()
+    subs = (1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)
+    axes.xaxis.set_major_locator(LogLocator(base=10, subs=subs, numticks=12))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.margins(x=0.1)
+    axes.set_xlabel(COST_TITLES[cost])
+    axes.set_ylabel("PSNR, dB: mean on and between samples")
+    axes.grid(color="0.9")
+
+
+def _places(trials: Sequence[Trial], cost: str) -> tuple[list[float], list[float]]:
+    return [getattr(trial, cost) for trial in trials], [trial.near or 0.0 for trial in trials]
+
+
+def _tick(value: float) -> str:
+    return f"{value:g}" if value < 1e3 else f"{value / 1e3:g}k" if value < 1e6 else f"{value / 1e6:g}M"
 
 
 def section(directory: Path) -> str:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, cast
 
 from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
+from mirrorbake.bake.map_sizes import SMALLEST_MAP
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.stage import prepare_stage
@@ -29,6 +31,10 @@ if TYPE_CHECKING:
 STUDY_NAME = "study.json"
 STUDIED_VIEWS = 3
 """Maps of a trial: a sample with a neighbour on either side."""
+LONGEST_SIDE = 160
+"""Pixels of the pictures of trials, and maps as much smaller as they are than the scene's."""
+SINGLES_SHARE = 0.75
+"""Of the time that there is, after which combinations are tried, for what it tells of single choices."""
 COMBINATIONS = 15
 """Tried at most, after the single axes."""
 NOTICEABLE = 0.25
@@ -87,6 +93,8 @@ def study(
     minutes: float | None = None,
     progress: ProgressReport | None = None,
     combinations: int = COMBINATIONS,
+    *,
+    longest_side: int = LONGEST_SIDE,
 ) -> Study:
     """Measure what a scene's choices cost and how far off they are.
 
@@ -108,6 +116,9 @@ def study(
         Told about every trial.
     combinations
         Tried at most, after the single axes.
+    longest_side
+        Pixels of the trials' pictures, the scene's if those are no larger; maps of a set size shrink
+        with them.
 
     Raises
     ------
@@ -123,13 +134,14 @@ def study(
             raise OptionError(f"--axes {name}: expected some of {', '.join(AXIS_NAMES)}")
     report(0, 1, "preparing the scene")
     folder.mkdir(parents=True, exist_ok=True)
+    config = shrunk(config, longest_side)
     notebook = Notebook(folder / STUDY_NAME, _identity(config))
     stage = _studied(config)
     chosen = [axis for axis in axes_of(stage) if not axes or axis.name in axes]
     if axes and len(chosen) < len(set(axes)):
         missing = sorted(set(axes) - {axis.name for axis in chosen})
         raise OptionError(f"--axes {missing[0]}: this scene has no such choice")
-    singles = [{axis.name: setting} for axis in chosen for setting in axis.settings[1:]]
+    singles = singles_of(chosen)
     planned = 1 + len(singles)
     trials: list[Trial] = []
 
@@ -146,18 +158,60 @@ def study(
         base = measure.trial({})
         if base is None or base.near is None:
             raise InputError("study: no pixel of the views in the middle of the arc is wholly the object's")
+        measure.share = SINGLES_SHARE
         try_all(singles, 1)
+        measure.share = 1.0
         promising = _promising(base, chosen, trials, combinations)
         planned += len(promising)
         try_all(promising, 1 + len(singles))
     report(planned, planned, f"{1 + len(trials)} trials")
-    result = Study(base, chosen, trials, planned - len(notebook.refused), dict(notebook.refused))
+    result = Study(
+        base, chosen, _in_order(chosen, trials), planned - len(notebook.refused), dict(notebook.refused)
+    )
     notebook.finish(summary(result))
     return result
 
 
+def singles_of(axes: Sequence[Axis]) -> list[dict[str, Setting]]:
+    """Return all settings alone, in the order of trials.
+
+    What needs no bake of its own comes first; of the others every axis has its turn before one has another,
+    so that a study that ends early has looked at all of them.
+    """
+    turns = [
+        (bool(setting.overrides), turn if setting.overrides else 0, number, {axis.name: setting})
+        for number, axis in enumerate(axes)
+        for turn, setting in enumerate(axis.settings[1:])
+    ]
+    return [settings for *_, settings in sorted(turns, key=lambda entry: entry[:3])]
+
+
+def _in_order(axes: Sequence[Axis], trials: Sequence[Trial]) -> list[Trial]:
+    """Return trials as the axes have their settings, whenever they were made; combinations at the end."""
+    places = [(axis.name, setting.label) for axis in axes for setting in axis.settings]
+
+    def place(trial: Trial) -> int:
+        (setting,) = trial.settings.items() if len(trial.settings) == 1 else (None,)
+        return len(places) if setting is None else places.index(setting)
+
+    return sorted(trials, key=place)
+
+
+def shrunk(config: SceneConfig, longest_side: int) -> SceneConfig:
+    """Return a scene with pictures of at most so many pixels a side, maps of a set size as much smaller."""
+    width, height = config.views.size
+    scale = longest_side / max(width, height)
+    if scale >= 1.0:
+        return config
+    overrides: dict[str, Any] = {"views.size": [max(1, round(scale * width)), max(1, round(scale * height))]}
+    if config.maps.size is not None:
+        smaller = 2 ** math.ceil(math.log2(scale * config.maps.size))
+        overrides["maps.size"] = min(max(smaller, SMALLEST_MAP), config.maps.size)
+    return overridden(config, overrides)
+
+
 _DECIDED = (
-    *("reflector.parts", "trace.depth", "trace.samples", "trace.noise", "maps.size", "maps.distant"),
+    *("reflector.parts", "trace.depth", "trace.samples", "trace.noise", "maps.distant"),
     "maps.shared_distant",
     *("views.traced", "infer.passes", "infer.neighbours"),
 )
@@ -189,6 +243,7 @@ def _studied(config: SceneConfig) -> Stage:
         for decision in plan.decisions
         if decision.automatic and decision.key in _DECIDED
     }
+    decided["maps.size"] = plan.map_size
     local = {decision.value for decision in plan.decisions if decision.key == "layers.local"}
     if len(local) == 1:
         decided["layers.local"] = local.pop()

@@ -16,7 +16,7 @@ from mirrorbake.evaluate.evaluate import Onlooker
 from mirrorbake.evaluate.metrics import flip
 from mirrorbake.evaluate.places import View, choose_views
 from mirrorbake.pem.opened import OpenedPem
-from mirrorbake.pem.pyramid import FACES, pyramid_of
+from mirrorbake.pem.pyramid import FACES, coarse_end, pyramid_of, size_of
 from mirrorbake.pem.run_time import RunTime
 from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.load import parse_config
@@ -219,20 +219,22 @@ def _remapped(pem: OpenedPem, settings: Iterable[Setting]) -> tuple[OpenedPem, f
     levels = next((s.levels for s in settings if s.levels is not None), None)
     storage = next((s.storage for s in settings if s.storage is not None), None)
     header = pem.store.header
-    finest = FACES[header.projection] * header.map_size**2
+    faces = FACES[header.projection]
     capture = pyramid_of(pem.store.read_capture(), header.projection)
 
     def remap(texels: FloatArray) -> FloatArray:
         if storage is not None:
             texels = storage.apply(texels)
-        return texels if levels is None else levels.apply(texels, header.map_size, capture)
+        if levels is None:
+            return texels
+        return levels.apply(texels, size_of(len(texels), faces), coarse_end(capture, len(texels)))
 
     size = 0
     # A view in the middle stands for all: they show the same scene.
     index = _middle(len(header.space))
     for part, layer in header.map_names():
         texels = pem.store.read_map(part, layer, index)
-        stored = texels if levels is None else texels[:finest]
+        stored = texels if levels is None else texels[: faces * size_of(len(texels), faces) ** 2]
         codes = stored.astype(header.precision) if storage is None else storage.encode(stored)
         size += packed_bytes(codes)
     run_time = (

@@ -97,6 +97,18 @@ def test_auto_is_a_value_of_every_key_that_is_decided_before_a_bake() -> None:
             "chromium or titanium",
         ),
         (
+            {"material": {"lobe": "phong", "roughness": 0.2}},
+            "scene: material: `roughness` has no meaning for lobe = 'phong'",
+        ),
+        (
+            {"material": {"roughness": 0.2, "exponent": 10}},
+            "scene: material: `exponent` has no meaning for lobe = 'ggx'",
+        ),
+        (
+            {"material": {"roughness": 0}},
+            "scene: material.roughness = 0: should be greater than 0",
+        ),
+        (
             {"material": {"fresnel": "conductor", "eta": 0.2}},
             "scene: material: fresnel = 'conductor' needs either `metal`, or `eta` and `k`",
         ),

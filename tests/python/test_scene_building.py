@@ -172,3 +172,24 @@ def test_a_panorama_of_one_channel_is_grey_and_of_others_is_rejected(tmp_path: P
     assert built.scene.object_names == ["ground", "reflector"]
     with pytest.raises(_core.FileError, match=r"odd\.exr: has the channels X, Y, Z, expected colours"):
         build(surroundings={"panorama": str(odd)})
+
+
+@pytest.mark.parametrize(
+    ("section", "lobe", "roughness", "exponent"),
+    [
+        ({}, "mirror", 0.1, 100.0),
+        ({"roughness": 0.3}, "ggx", 0.3, 100.0),
+        ({"lobe": "ggx"}, "ggx", 0.1, 100.0),
+        ({"exponent": 20}, "phong", 0.1, 20.0),
+    ],
+)
+def test_a_rough_material_reaches_the_tracer(
+    section: dict[str, Any], lobe: str, roughness: float, exponent: float
+) -> None:
+    config = parse_config({"material": section, "reflector": {"subdivisions": 2}}, "rough")
+    built = build_scene(config)
+    [first, *_] = built.scene.object_part_materials(built.reflector)
+    material = built.scene.material(first)
+    assert material.lobe == lobe
+    assert material.roughness == pytest.approx(roughness)
+    assert material.exponent == pytest.approx(exponent)

@@ -35,7 +35,6 @@ ILLUMINANT: Final = "D65"
 MOST_PARTS: Final = 16
 """Into which a surface is cut."""
 
-
 Parts: TypeAlias = Literal["split", "joined"] | Annotated[int, Field(ge=1, le=MOST_PARTS)]
 
 
@@ -86,7 +85,7 @@ class Reflector(Section):
 
 
 _OTHER_NAMES = {"chrome": "chromium"}
-"""How people call metals that the tables know by another name."""
+_LOBES = {"roughness": "ggx", "exponent": "phong"}
 
 
 class MaterialConfig(Section):
@@ -110,11 +109,21 @@ class MaterialConfig(Section):
     """Image that multiplies the albedo, on the mesh's texture coordinates."""
     layers: Literal["additive", "coated"] = "additive"
     """`additive`: F·L + D; `coated`: F·L + (1 - F)·D."""
+    lobe: Literal["mirror", "ggx", "phong"] = "mirror"
+    """Directions into which it reflects; `roughness` alone means `ggx`, `exponent` `phong`."""
+    roughness: Annotated[float, Field(gt=0, le=1)] | None = None
+    """`ggx`: α of the facets' slopes. Default 0.1."""
+    exponent: Annotated[float, Field(ge=1, le=1e6)] | None = None
+    """`phong`: of the cosine. Default 100."""
 
     @model_validator(mode="before")
     @classmethod
     def _parameters_imply_the_model(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping) or "fresnel" in data:
+        if not isinstance(data, Mapping):
+            return data
+        lobes = [lobe for key, lobe in _LOBES.items() if data.get(key) is not None]
+        data = {"lobe": lobes[0], **data} if lobes else data
+        if "fresnel" in data:
             return data
         for keys, model in ((("metal", "eta", "k"), "conductor"), (("ior",), "dielectric")):
             if any(data.get(key) is not None for key in keys):
@@ -132,6 +141,9 @@ class MaterialConfig(Section):
         for key in ("r0", "ior", "eta", "k", "metal"):
             if getattr(self, key) is not None and key not in used[self.fresnel]:
                 raise ValueError(f"`{key}` has no meaning for fresnel = {self.fresnel!r}")
+        for key, lobe in _LOBES.items():
+            if getattr(self, key) is not None and self.lobe != lobe:
+                raise ValueError(f"`{key}` has no meaning for lobe = {self.lobe!r}")
         has_index = self.eta is not None and self.k is not None
         if self.fresnel == "conductor" and (self.metal is not None) == has_index:
             raise ValueError("fresnel = 'conductor' needs either `metal`, or `eta` and `k`")
@@ -261,9 +273,8 @@ class Infer(Section):
     """Of fit = "display": weight of the neighbouring samples' views in the fit of a sample. "auto": 0.3 where
     they are close, by `auto.quality`."""
     smoothness: Annotated[Annotated[float, Field(ge=0, le=1e6)] | None, *AUTO] = 3e-4
-    """Weight λ of differences between neighbouring texels: small fits the sampled view best, large survives
-    longer away from it. "auto": by what pixels and a view that are held out say; `level_agreement` and
-    `prior_weight` are for λ = 3e-4 then, and scaled with it."""
+    """Weight λ of differences between neighbouring texels: small fits the sampled view best, large lasts away
+    from it. "auto": by what is held out; `level_agreement` and `prior_weight` are scaled alike then."""
     level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
     """Weight λ of a texel's difference from the mean of the four below it in the pyramid."""
     prior: Literal["smooth", "captured"] = "captured"
@@ -302,7 +313,6 @@ class Auto(Section):
 
     quality: Literal["draft", "normal", "high"] = "normal"
     """What a bake may cost: noise of targets, passes, neighbours' views, the static set."""
-
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.01
     """Relative RMS change of the object's picture that is worth no layer and no bounce."""
     noise: Annotated[float, Field(gt=0, lt=1)] = 0.05

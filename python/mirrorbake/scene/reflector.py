@@ -199,6 +199,9 @@ def _material(config: MaterialConfig, scene: _core.Scene) -> int:
         albedo=config.albedo,
         albedo_texture=texture,
         layers=config.layers,
+        lobe=config.lobe,
+        roughness=config.roughness or 0.1,
+        exponent=config.exponent or 100.0,
     )
     return scene.add_material(material)
 

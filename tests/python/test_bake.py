@@ -11,6 +11,7 @@ import pytest
 
 from mirrorbake import _core
 from mirrorbake.bake.bake import bake
+from mirrorbake.bake.local_shapes import enclosing_ellipsoid
 from mirrorbake.errors import InputError
 from mirrorbake.evaluate.contact_sheet import contact_sheet
 from mirrorbake.evaluate.demo import demo_config
@@ -91,9 +92,8 @@ def test_the_box_is_the_room_that_the_teapot_sees(baked: Baked) -> None:
 
 def test_the_ellipsoid_of_each_part_encloses_it(baked: Baked) -> None:
     built = baked.stage.built
-    header = PemStore.open(baked.directory).header
-    for number, part in enumerate(header.parts):
-        ellipsoid = part.shells[0].proxy
+    for number in range(len(built.part_names)):
+        ellipsoid = proxy_to_attributes(enclosing_ellipsoid(built, number))
         points = built.positions[np.unique(built.triangles[built.parts == number])]
         scaled = (points - np.array(ellipsoid["centre"])) / np.array(ellipsoid["radii"])
         farthest = np.linalg.norm(scaled, axis=1).max()

@@ -30,7 +30,7 @@ from mirrorbake.scene.config import SceneConfig
 from mirrorbake.tone import srgb_bytes
 
 FOLDER = Path(__file__).parent / "images"
-SAMPLES = 32
+SAMPLES = 128
 """Of Mitsuba, per pixel."""
 VIEW = 0.5
 

@@ -25,7 +25,6 @@ from mirrorbake.evaluate.evaluate import evaluate
 from mirrorbake.evaluate.metrics import psnr
 from mirrorbake.evaluate.report import report
 from mirrorbake.pem.export.images import ImageFormat
-from mirrorbake.pem.export.map_sets import sample_set, static_set
 from mirrorbake.pem.export.source import export_source
 from mirrorbake.pem.export.web import WebPem
 from mirrorbake.pem.location import Location
@@ -308,7 +307,7 @@ def test_maps_are_fitted_to_the_display_in_every_kind_of_scene(name: str, tmp_pa
     assert verify(tmp_path / "pem").is_sound
 
 
-def test_exports_of_cubes_refuse_paraboloids_by_the_name_of_the_key(tmp_path: Path) -> None:
+def test_the_page_draws_paraboloids_as_they_are(tmp_path: Path) -> None:
     config = scene(
         tmp_path,
         {"count": 1},
@@ -316,11 +315,6 @@ def test_exports_of_cubes_refuse_paraboloids_by_the_name_of_the_key(tmp_path: Pa
     )
     bake(config, tmp_path / "pem")
     pem = open_pem(tmp_path / "pem")
-    with pytest.raises(InputError, match=r'maps\.projection = "paraboloid"'):
-        static_set(pem.store)
-    with pytest.raises(InputError, match=r'maps\.projection = "paraboloid"'):
-        sample_set(pem.store, 0)
-    # The page draws them.
     web = WebPem(export_source(pem))
     assert json.loads(web.read("manifest.json"))["projection"] == "paraboloid"
     atlas = ImageFormat(exact=False).decode(web.read("samples/00000/0.avif"))

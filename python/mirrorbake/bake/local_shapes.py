@@ -1,4 +1,4 @@
-"""The geometry of what the object reflects of itself: that on which a part's light collides least."""
+"""The geometry of what the object reflects of itself: about each part, or fitted to what its rays meet."""
 
 from __future__ import annotations
 
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 MIN_HITS = 100
 """Below this many reflected rays there is nothing to fit a shape to."""
-BETTER, WORTH = 0.9, 0.005
-"""Of the enclosing ellipsoid's collision, that a fitted shape may have at most to be taken instead; and by
-how much of the display's range it has to be less."""
 TEXELS = 48
 """Along a side of a cube's face: how finely places of a map are told apart in the trial images."""
 GREY = 0.5
@@ -48,10 +45,9 @@ def local_shape(
 ) -> tuple[_core.Proxy, Decision]:
     """Fit the shape of a part's map of the object itself.
 
-    Shapes are compared by how much the light that a part's samples want of one texel differs, as parts are:
-    it is what no map on that shape can show. Where lookups end beside what the rays meet is no measure of it:
-    an ellipsoid through the hits predicts them far better than one about the part, and yet leaves 2 to 3 dB
-    less on the teapot, since samples outside of it that see different things read the same texels.
+    "auto" is the ellipsoid about the part. How much the light that samples want of one texel differs, which
+    no map on a shape can show, is told of it and of the best of the fitted shapes; even one that halves it
+    leaves less on the teapot, on its samples and more so beyond them (the decision record has the figures).
 
     Parameters
     ----------
@@ -108,12 +104,11 @@ def local_shape(
     own = collision(about)
     fitted = [(collision(candidate.proxy), candidate) for candidate in choice.candidates]
     least, best = min(fitted, key=lambda entry: entry[0])
-    words = "light that is read from one texel differs by {:.3f} of the display's range, on {} by {:.3f}"
-    if least > min(BETTER * own, own - WORTH):
-        return about, decided(
-            ENCLOSING, words.format(own, f"the best fitted shape, {best.name},", least), own
-        )
-    return best.proxy, decided(best.name, words.format(least, "an ellipsoid about the part", own), least)
+    reason = (
+        f"light that is read from one texel differs by {own:.3f} of the display's range, "
+        f"on the best fitted shape, {best.name}, by {least:.3f}"
+    )
+    return about, decided(ENCLOSING, reason, own)
 
 
 def _wanted_light(probe: Probe, shell: int, used: NDArray[np.bool_]) -> DoubleArray:

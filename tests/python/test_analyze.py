@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -178,7 +179,7 @@ def test_what_a_part_sees_of_the_object_lies_about_it_unless_told(tmp_path: Path
         assert shape.automatic
         assert shape.measured is not None
         # The best of the fitted shapes is named beside it.
-        assert 0.0 < float(shape.reason.split()[-1]) < 1.0
+        assert re.search(r"best fitted shape, [a-z ]+, by \d\.\d{3}$", shape.reason)
         assert shape.value == "enclosing ellipsoid"
     table = {"name": "local", "objects": ["itself"], "proxy": "enclosing ellipsoid"}
     data = make_stage(tmp_path, RING).config.model_dump(mode="json", exclude_unset=True)

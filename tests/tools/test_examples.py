@@ -48,6 +48,7 @@ def test_the_mesh_example_takes_any_mesh_and_panorama(tmp_path: Path, mesh: str,
         "maps.size=64",
         "trace.samples=4",
         "trace.indirect=none",
+        "static.views=0",
     ]
     config = load_config(EXAMPLES / "mesh-panorama.toml", [parse_override(text) for text in assignments])
     stage = prepare_stage(config)

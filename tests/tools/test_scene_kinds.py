@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import base64
 import json
-import os
-import resource
 import struct
 import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -167,24 +166,32 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
+MEASURED = f"""
+import os, resource, sys
+resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))
+child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
+_, status, used = os.wait4(child, 0)
+print(used.ru_maxrss)
+sys.exit(os.waitstatus_to_exitcode(status) & 255)
+"""
+"""Runs a program and prints its memory in kilobytes, as Linux counts it. It is small itself: what the process
+that starts a program holds is counted as the program's."""
+
+
 def read(path: Path) -> tuple[int, list[str]]:
     """Trace a pixel of a scene in a process of its own; its exit status, and the lines that it says."""
     program = find_program("mb-trace")
     assert program is not None
     command = [program, "--threads", "1", "beauty", path, "--eye", "0", "0", "5", "--target", "0", "0", "0"]
     command += ["--size", "1x1", "--spp", "1", "-o", path.with_name("out.exr")]
-    said = path.with_name("said")
-    with said.open("w") as file:
-        child = subprocess.Popen(
-            [str(word) for word in command],
-            stderr=file,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS)),
-        )
-        _, status, used = os.wait4(child.pid, 0)
-        child.returncode = os.waitstatus_to_exitcode(status)
-    # Kilobytes on Linux.
-    assert used.ru_maxrss * 1024 < BYTES
-    return child.returncode, said.read_text().splitlines()
+    result = subprocess.run(
+        [sys.executable, "-S", "-c", MEASURED, *map(str, command)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert int(result.stdout.split()[-1]) * 1024 < BYTES
+    return result.returncode, result.stderr.splitlines()
 
 
 def warnings_of(lines: list[str]) -> list[str]:

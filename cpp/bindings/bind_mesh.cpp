@@ -25,6 +25,7 @@ namespace {
 
 using TriangleArray = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using UvArray = nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using TangentArray = nb::ndarray<const float, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
 using PartArray = nb::ndarray<const std::uint16_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 
 template <typename Element, typename Array>
@@ -44,7 +45,8 @@ void bind_triangle_mesh(nb::module_& m) {
           "__init__",
           [](TriangleMesh* self, const PointArray& positions, const TriangleArray& triangles,
              const std::optional<PointArray>& normals, const std::optional<UvArray>& uvs,
-             const std::optional<PartArray>& parts, const std::optional<PointArray>& colors) {
+             const std::optional<PartArray>& parts, const std::optional<PointArray>& colors,
+             const std::optional<TangentArray>& tangents) {
             TriangleMesh mesh;
             mesh.positions = copied<glm::vec3>(positions);
             mesh.triangles = copied<glm::uvec3>(triangles);
@@ -52,15 +54,19 @@ void bind_triangle_mesh(nb::module_& m) {
             if (uvs) mesh.uvs = copied<glm::vec2>(*uvs);
             if (parts) mesh.parts = copied<std::uint16_t>(*parts);
             if (colors) mesh.colors = copied<glm::vec3>(*colors);
+            if (tangents) mesh.tangents = copied<glm::vec4>(*tangents);
             validate(mesh);
             new (self) TriangleMesh(std::move(mesh));
           },
           nb::arg("positions"), nb::arg("triangles"), nb::arg("normals") = nb::none(),
           nb::arg("uvs") = nb::none(), nb::arg("parts") = nb::none(), nb::arg("colors") = nb::none(),
+          nb::arg("tangents") = nb::none(),
           R"(Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from
 outside, unit normals (V, 3) (default: flat shading), uvs (V, 2) with v up, the part of each triangle
-(T,), and colours (V, 3) in [0, 1], linear, that multiply the material's albedo. Raises InvalidArgument
-for anything not finite, indices out of range or a mesh without area.)")
+(T,), colours (V, 3) in [0, 1], linear, that multiply the material's albedo, and tangents (V, 4) of normal
+textures: the unit direction in which u grows and the sign of the bitangent, ±1, or zeros for none (default:
+from the coordinates). Raises InvalidArgument for anything not finite, indices out of range or a mesh without
+area.)")
       .def_prop_ro(
           "positions", [](nb::handle self) { return vectors_view(mesh_of(self).positions, self); },
           "Vertices, (V, 3), a read-only view.")
@@ -79,29 +85,32 @@ for anything not finite, indices out of range or a mesh without area.)")
       .def_prop_ro(
           "colors", [](nb::handle self) { return vectors_view(mesh_of(self).colors, self); },
           "Colours of the vertices, (V, 3), linear, or (0, 3) if they have none.")
+      .def_prop_ro(
+          "tangents", [](nb::handle self) { return vectors_view(mesh_of(self).tangents, self); },
+          "Tangents of normal textures, (V, 4): direction of u and sign of the bitangent; or (0, 4).")
       .def("__getstate__",
            [](const TriangleMesh& mesh) {
              return nb::make_tuple(
                  vectors_to_numpy(std::vector(mesh.positions)), vectors_to_numpy(std::vector(mesh.triangles)),
                  vectors_to_numpy(std::vector(mesh.normals)), vectors_to_numpy(std::vector(mesh.uvs)),
                  to_numpy(std::vector(mesh.parts), {mesh.parts.size()}),
-                 vectors_to_numpy(std::vector(mesh.colors)));
+                 vectors_to_numpy(std::vector(mesh.colors)), vectors_to_numpy(std::vector(mesh.tangents)));
            })
-      .def(
-          "__setstate__",
-          [](TriangleMesh& self,
-             const std::tuple<PointArray, TriangleArray, PointArray, UvArray, PartArray, PointArray>& state) {
-            const auto& [positions, triangles, normals, uvs, parts, colors] = state;
-            TriangleMesh mesh;
-            mesh.positions = copied<glm::vec3>(positions);
-            mesh.triangles = copied<glm::uvec3>(triangles);
-            mesh.normals = copied<glm::vec3>(normals);
-            mesh.uvs = copied<glm::vec2>(uvs);
-            mesh.parts = copied<std::uint16_t>(parts);
-            mesh.colors = copied<glm::vec3>(colors);
-            validate(mesh);
-            new (&self) TriangleMesh(std::move(mesh));
-          })
+      .def("__setstate__",
+           [](TriangleMesh& self, const std::tuple<PointArray, TriangleArray, PointArray, UvArray, PartArray,
+                                                   PointArray, TangentArray>& state) {
+             const auto& [positions, triangles, normals, uvs, parts, colors, tangents] = state;
+             TriangleMesh mesh;
+             mesh.positions = copied<glm::vec3>(positions);
+             mesh.triangles = copied<glm::uvec3>(triangles);
+             mesh.normals = copied<glm::vec3>(normals);
+             mesh.uvs = copied<glm::vec2>(uvs);
+             mesh.parts = copied<std::uint16_t>(parts);
+             mesh.colors = copied<glm::vec3>(colors);
+             mesh.tangents = copied<glm::vec4>(tangents);
+             validate(mesh);
+             new (&self) TriangleMesh(std::move(mesh));
+           })
       .def("__repr__", [](const TriangleMesh& mesh) {
         return "TriangleMesh(" + std::to_string(mesh.positions.size()) + " vertices, " +
                std::to_string(mesh.triangles.size()) + " triangles)";

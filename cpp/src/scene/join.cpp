@@ -49,6 +49,7 @@ Object join_objects(const Scene& scene, const std::string& name, std::size_t mos
   const bool has_normals = any([](const TriangleMesh& mesh) { return !mesh.normals.empty(); });
   const bool has_uvs = any([](const TriangleMesh& mesh) { return !mesh.uvs.empty(); });
   const bool has_colors = any([](const TriangleMesh& mesh) { return !mesh.colors.empty(); });
+  const bool has_tangents = any([](const TriangleMesh& mesh) { return !mesh.tangents.empty(); });
 
   Object joined;
   joined.name = name;
@@ -91,8 +92,10 @@ Object join_objects(const Scene& scene, const std::string& name, std::size_t mos
     append(joined.mesh.normals, mesh.normals);
     append(joined.mesh.uvs, mesh.uvs);
     append(joined.mesh.colors, mesh.colors);
+    append(joined.mesh.tangents, mesh.tangents);
     if (has_uvs) joined.mesh.uvs.resize(joined.mesh.positions.size(), glm::vec2(0.0F));
     if (has_colors) joined.mesh.colors.resize(joined.mesh.positions.size(), glm::vec3(1.0F));
+    if (has_tangents) joined.mesh.tangents.resize(joined.mesh.positions.size(), glm::vec4(0.0F));
   }
   joined.material = joined.part_materials.front();
   return joined;

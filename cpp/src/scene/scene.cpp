@@ -187,6 +187,18 @@ void check_mesh(const std::string& where, const TriangleMesh& mesh, std::size_t 
                             "a unit vector");
     }
   }
+  if (!mesh.tangents.empty() && mesh.tangents.size() != vertex_count) {
+    throw InvalidArgument(where + " tangent count", std::to_string(mesh.tangents.size()),
+                          "0 or the vertex count " + std::to_string(vertex_count));
+  }
+  for (std::size_t i = 0; i < mesh.tangents.size(); ++i) {
+    const glm::vec4 t = mesh.tangents[i];
+    if (t != glm::vec4(0.0F) && !(is_unit(glm::vec3(t)) && std::abs(t.w) == 1.0F)) {
+      throw InvalidArgument(where + " tangent " + std::to_string(i),
+                            text_of(glm::vec3(t)) + " with the sign " + text_of(t.w),
+                            "a unit vector with the sign 1 or -1, or zeros");
+    }
+  }
   if (!mesh.uvs.empty() && mesh.uvs.size() != vertex_count) {
     throw InvalidArgument(where + " uv count", std::to_string(mesh.uvs.size()),
                           "0 or the vertex count " + std::to_string(vertex_count));

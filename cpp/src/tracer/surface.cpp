@@ -36,25 +36,36 @@ glm::vec3 bend_normal(glm::vec3 view, glm::vec3 n, glm::vec3 geometric) {
   return length > 0.0F ? half / length : geometric;
 }
 
-// The shading normal bent by a texture (glTF 2.0 §3.9.3). The tangents are those of the triangle's plane,
-// made upright to the normal that is interpolated over it.
-glm::vec3 mapped_normal(const Scene& scene, const TriangleMesh& mesh, const Surface& s, glm::vec2 barycentric,
-                        const std::array<glm::vec3, 3>& corners, glm::vec3 normal) {
-  const Material& material = *s.material;
-  if (mesh.uvs.empty()) return normal;
-  const glm::uvec3 t = mesh.triangles[s.triangle];
+// The direction in which u grows on a triangle, of any length, and the sign of the bitangent: those of the
+// vertices, else of the triangle's plane. 0 where there is none.
+glm::vec4 tangent_of(const TriangleMesh& mesh, glm::uvec3 t, glm::vec2 barycentric,
+                     const std::array<glm::vec3, 3>& corners) {
+  if (!mesh.tangents.empty() && mesh.tangents[t.x].w * mesh.tangents[t.y].w * mesh.tangents[t.z].w != 0.0F) {
+    const glm::vec4 along = interpolate(mesh.tangents, t, barycentric);
+    return {glm::vec3(along), std::copysign(1.0F, along.w)};
+  }
+  if (mesh.uvs.empty()) return glm::vec4(0.0F);
   const glm::vec2 du = mesh.uvs[t.y] - mesh.uvs[t.x];
   const glm::vec2 dv = mesh.uvs[t.z] - mesh.uvs[t.x];
   const float determinant = du.x * dv.y - du.y * dv.x;
-  if (determinant == 0.0F) return normal;
+  if (determinant == 0.0F) return glm::vec4(0.0F);
   const glm::vec3 e1 = corners[1] - corners[0];
   const glm::vec3 e2 = corners[2] - corners[0];
-  const glm::vec3 along_u = (dv.y * e1 - du.y * e2) * std::copysign(1.0F, determinant);
-  const glm::vec3 flat = along_u - glm::dot(along_u, normal) * normal;
-  const float length = glm::length(flat);
+  const float sign = std::copysign(1.0F, determinant);
+  return {sign * (dv.y * e1 - du.y * e2), sign};
+}
+
+// The shading normal bent by a texture (glTF 2.0 §3.9.3). Tangents are made upright to the normal that is
+// interpolated over the triangle.
+glm::vec3 mapped_normal(const Scene& scene, const TriangleMesh& mesh, const Surface& s, glm::vec2 barycentric,
+                        const std::array<glm::vec3, 3>& corners, glm::vec3 normal) {
+  const Material& material = *s.material;
+  const glm::vec4 along = tangent_of(mesh, mesh.triangles[s.triangle], barycentric, corners);
+  const glm::vec3 upright = glm::vec3(along) - glm::dot(glm::vec3(along), normal) * normal;
+  const float length = glm::length(upright);
   if (!(length > 0.0F)) return normal;
-  const glm::vec3 tangent = flat / length;
-  const glm::vec3 bitangent = glm::cross(normal, tangent) * std::copysign(1.0F, determinant);
+  const glm::vec3 tangent = upright / length;
+  const glm::vec3 bitangent = along.w * glm::cross(normal, tangent);
   const glm::vec3 texel =
       texture_lookup(scene, material.normal_texture, uv_at(mesh, s.triangle, barycentric)) * 2.0F - 1.0F;
   const glm::vec3 bent = material.normal_scale * (texel.x * tangent + texel.y * bitangent) + texel.z * normal;

@@ -146,6 +146,7 @@ def _with_parts(mesh: _core.TriangleMesh, parts: NDArray[np.uint16] | None) -> _
         mesh.uvs if len(mesh.uvs) else None,
         parts,
         mesh.colors if len(mesh.colors) else None,
+        mesh.tangents if len(mesh.tangents) else None,
     )
 
 
@@ -154,8 +155,11 @@ def _placed(mesh: _core.TriangleMesh, reflector: Reflector, pose: Pose) -> _core
     positions = np.asarray(mesh.positions).astype(np.float64) @ rotation.T
     if reflector.mesh is not None:
         positions = _stand_on_ground(positions, reflector)
-    # Rotation and uniform scale leave normals unit vectors.
-    normals = np.asarray(mesh.normals).astype(np.float64) @ (pose.rotation @ rotation).T
+    # Rotation and uniform scale leave normals and tangents unit vectors.
+    turn = (pose.rotation @ rotation).T
+    normals = np.asarray(mesh.normals).astype(np.float64) @ turn
+    tangents = np.array(mesh.tangents)
+    tangents[:, :3] = tangents[:, :3].astype(np.float64) @ turn
     return _core.TriangleMesh(
         pose.moved(positions).astype(np.float32),
         mesh.triangles,
@@ -163,6 +167,7 @@ def _placed(mesh: _core.TriangleMesh, reflector: Reflector, pose: Pose) -> _core
         mesh.uvs if len(mesh.uvs) else None,
         mesh.parts if len(mesh.parts) else None,
         mesh.colors if len(mesh.colors) else None,
+        tangents if len(tangents) else None,
     )
 
 

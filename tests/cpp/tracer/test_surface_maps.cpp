@@ -1,7 +1,10 @@
 // What textures and colours of the mesh do to a surface.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "mirrorbake/scene/scene.hpp"
 #include "mirrorbake/scene/shapes.hpp"
@@ -54,6 +57,31 @@ TEST(SurfaceMaps, ANormalTextureTiltsTheNormalAlongTheTextureCoordinates) {
   material.normal_scale = 1.0F;
   plate.scene.objects[0].mesh.uvs.clear();
   EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(0, 1, 0)), 1e-4F);
+}
+
+// glTF 2.0 §3.7.2.1: bitangent = cross(normal, tangent.xyz) * tangent.w. Good to the sums of mean_normal().
+TEST(SurfaceMaps, TangentsOfTheMeshTurnTheNormalTextureWhateverItsCoordinatesSay) {
+  Plate plate;
+  const glm::vec3 tilt = glm::normalize(glm::vec3(0.3F, 0.2F, 1.0F));
+  Texture texture;
+  texture.image = Image(1, 1, {"R", "G", "B"});
+  for (int c = 0; c < 3; ++c) texture.image.pixels[static_cast<std::size_t>(c)] = 0.5F * tilt[c] + 0.5F;
+  plate.scene.textures.push_back(texture);
+  plate.scene.materials[0].normal_texture.texture = 0;
+  TriangleMesh& mesh = plate.scene.objects[0].mesh;
+  const glm::vec3 normal(0, 1, 0);
+  for (const float degrees : {0.0F, 30.0F, 90.0F, 200.0F}) {
+    for (const float sign : {1.0F, -1.0F}) {
+      const glm::vec3 along(std::cos(glm::radians(degrees)), 0, std::sin(glm::radians(degrees)));
+      mesh.tangents.assign(mesh.positions.size(), {along, sign});
+      const glm::vec3 expected = tilt.x * along + tilt.y * sign * glm::cross(normal, along) + tilt.z * normal;
+      EXPECT_LT(glm::length(plate.mean_normal() - expected), 1e-4F) << degrees << " " << sign;
+    }
+  }
+  // A corner without one: the coordinates' own, along +X and −Z.
+  mesh.tangents[mesh.triangles[0].x] = mesh.tangents[mesh.triangles[1].y] = glm::vec4(0.0F);
+  mesh.tangents[mesh.triangles[0].y] = mesh.tangents[mesh.triangles[1].x] = glm::vec4(0.0F);
+  EXPECT_LT(glm::length(plate.mean_normal() - glm::vec3(tilt.x, tilt.z, -tilt.y)), 1e-4F);
 }
 
 TEST(SurfaceMaps, ColoursOfTheMeshMultiplyAlbedoAndOfMetalsTheReflectance) {

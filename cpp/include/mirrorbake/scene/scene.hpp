@@ -8,6 +8,7 @@
 #include <vector>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include "mirrorbake/core/enum_names.hpp"
 #include "mirrorbake/image/image.hpp"
@@ -26,6 +27,10 @@ struct TriangleMesh {
   std::vector<std::uint16_t> parts;   ///< part of each triangle; empty: all belong to part 0
   /// One per vertex, in [0,1], linear, multiply the albedo; empty: (1,1,1)
   std::vector<glm::vec3> colors = {};
+  /// One per vertex: the unit direction in which u grows, and in w the sign of the bitangent, ±1, which is
+  /// w·(normal × xyz). All 0: this vertex has none. Empty: none has. Normal textures use them; where a corner
+  /// of a triangle has none, they use the directions in which the triangle's own coordinates grow.
+  std::vector<glm::vec4> tangents = {};
 };
 
 /// Texels that materials refer to: in memory, or in a file.
@@ -102,8 +107,8 @@ struct Material {
   TextureReference opacity_texture;   ///< its first channel multiplies `opacity`; its texels are in memory
   /// All is there where the opacity is at least this, nothing elsewhere
   std::optional<float> opacity_cutoff;
-  /// Bends the shading normal as glTF 2.0 §3.9.3 has it: texels (x, y, z)/2 + 1/2 in the frame of ∂p/∂u,
-  /// ∂p/∂v, both of the mesh's coordinates with v up, and the normal.
+  /// Bends the shading normal as glTF 2.0 §3.9.3 has it: texels (x, y, z)/2 + 1/2 in the frame of the mesh's
+  /// tangent, bitangent and normal. Without tangents: of ∂p/∂u, ∂p/∂v, with v up, and the normal.
   TextureReference normal_texture;
   float normal_scale = 1.0F;             ///< of the texels' x and y
   bool colors_tint_reflectance = false;  ///< the mesh's colours multiply fresnel.r0, too: of a metal

@@ -49,6 +49,7 @@ std::vector<glm::uvec3> triangles_of(const std::string& path, int mode,
 // A primitive as the file has it, in the node's space. What it does not have is empty.
 struct Vertices {
   std::vector<glm::vec3> positions, normals, colors;
+  std::vector<glm::vec4> tangents;
   std::vector<glm::vec2> uvs;
   std::vector<glm::uvec3> triangles;
 };
@@ -90,6 +91,7 @@ class GltfBuilder {
     TriangleMesh& mesh = loaded_.mesh;
     if (!has_uvs_) mesh.uvs.clear();
     if (!has_colors_) mesh.colors.clear();
+    if (!has_tangents_) mesh.tangents.clear();
     complete_normals(mesh);
     return std::move(loaded_);
   }
@@ -152,8 +154,20 @@ class GltfBuilder {
     mesh.uvs.resize(mesh.positions.size(), glm::vec2(0.0F));
     mesh.colors.insert(mesh.colors.end(), vertices.colors.begin(), vertices.colors.end());
     mesh.colors.resize(mesh.positions.size(), glm::vec3(1.0F));
+    for (const glm::vec4 t : vertices.tangents) mesh.tangents.push_back(turned_tangent(t, m, is_mirrored));
+    mesh.tangents.resize(mesh.positions.size(), glm::vec4(0.0F));
+    has_tangents_ = has_tangents_ || !vertices.tangents.empty();
     has_uvs_ = has_uvs_ || !vertices.uvs.empty();
     has_colors_ = has_colors_ || !vertices.colors.empty();
+  }
+
+  // A tangent runs along the surface, and so does its image. What a mirror does to the cross product with the
+  // normal, which follows the cofactors, the sign undoes.
+  static glm::vec4 turned_tangent(glm::vec4 tangent, const glm::dmat3& world_from_node, bool is_mirrored) {
+    const glm::dvec3 turned = world_from_node * glm::dvec3(tangent);
+    const double length = glm::length(turned);
+    if (!(length > 0.0)) return glm::vec4(0.0F);
+    return {glm::vec3(turned / length), is_mirrored ? -tangent.w : tangent.w};
   }
 
   // The numbers of an attribute, one row for each vertex; nothing if there is none. `type` 0 stands for VEC3
@@ -182,6 +196,7 @@ class GltfBuilder {
     set_rows(numbers(primitive, "POSITION", TINYGLTF_TYPE_VEC3, "position", count), result.positions);
     result.triangles = read_triangles(primitive, count);
     set_normals(numbers(primitive, "NORMAL", TINYGLTF_TYPE_VEC3, "normal", count), result);
+    set_tangents(numbers(primitive, "TANGENT", TINYGLTF_TYPE_VEC4, "tangent", count), result);
     set_uvs(numbers(primitive, uv_name(primitive), TINYGLTF_TYPE_VEC2, "texture coordinate", count), result);
     set_colors(numbers(primitive, "COLOR_0", 0, "colour", count), result);
     return result;
@@ -197,6 +212,7 @@ class GltfBuilder {
     if (result.positions.empty()) fail(path_, "a Draco mesh has no positions");
     result.triangles = mesh.triangles();
     set_normals(mesh.numbers("NORMAL", 3), result);
+    set_tangents(mesh.numbers("TANGENT", 4), result);
     set_uvs(mesh.numbers(uv_name(primitive), 2), result);
     set_colors(mesh.numbers("COLOR_0", 0), result);
     return result;
@@ -221,6 +237,20 @@ class GltfBuilder {
       if (!std::isfinite(n.x) || !std::isfinite(n.y) || !std::isfinite(n.z)) {
         fail(path_, "normal " + std::to_string(i) + " is not finite");
       }
+    }
+  }
+
+  // Exporters write zeros where coordinates have no direction, and quantised ones round the sign.
+  void set_tangents(const gltf::Numbers& numbers, Vertices& vertices) const {
+    for (std::size_t i = 0; i < numbers.count; ++i) {
+      const float* v = numbers.values.data() + 4 * i;
+      if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2]) || !std::isfinite(v[3])) {
+        fail(path_, "tangent " + std::to_string(i) + " is not finite");
+      }
+      const glm::vec3 along(v[0], v[1], v[2]);
+      const float length = glm::length(along);
+      vertices.tangents.push_back(length > 1e-6F ? glm::vec4(along / length, v[3] < 0.0F ? -1.0F : 1.0F)
+                                                 : glm::vec4(0.0F));
     }
   }
 
@@ -272,6 +302,7 @@ class GltfBuilder {
   LoadedMesh loaded_;
   bool has_uvs_ = false;
   bool has_colors_ = false;
+  bool has_tangents_ = false;
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec4.hpp>
 
+#include "../tangents.hpp"
 #include "gltf_document.hpp"
 #include "gltf_materials.hpp"
 #include "gltf_mesh.hpp"
@@ -63,6 +64,14 @@ class GltfScene {
       if (!material_of.contains(group.material)) material_of[group.material] = materials_.add(group.material);
     }
     loaded_.scene.objects = split_into_objects(std::move(mesh), loaded_.scene.materials, material_of);
+    for (Object& object : loaded_.scene.objects) {
+      const Material& material = loaded_.scene.materials[static_cast<std::size_t>(object.material)];
+      if (material.normal_texture.texture >= 0) {
+        derive_tangents(object.mesh);
+      } else {
+        object.mesh.tangents.clear();  // nothing reads them
+      }
+    }
     gltf::visit_nodes(path_, model_, options_.origin,
                       [&](int index, const tinygltf::Node& node, const glm::dmat4& world_from_node) {
                         add_node(index, node, world_from_node);

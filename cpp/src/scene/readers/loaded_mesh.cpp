@@ -136,12 +136,14 @@ void drop_degenerate(const std::string& path, LoadedMesh& loaded) {
     if (!mesh.normals.empty()) mesh.normals[next] = mesh.normals[i];
     if (!mesh.uvs.empty()) mesh.uvs[next] = mesh.uvs[i];
     if (!mesh.colors.empty()) mesh.colors[next] = mesh.colors[i];
+    if (!mesh.tangents.empty()) mesh.tangents[next] = mesh.tangents[i];
     new_index[i] = next++;
   }
   mesh.positions.resize(next);
   if (!mesh.normals.empty()) mesh.normals.resize(next);
   if (!mesh.uvs.empty()) mesh.uvs.resize(next);
   if (!mesh.colors.empty()) mesh.colors.resize(next);
+  if (!mesh.tangents.empty()) mesh.tangents.resize(next);
   for (glm::uvec3& t : mesh.triangles) t = {new_index[t.x], new_index[t.y], new_index[t.z]};
 }
 

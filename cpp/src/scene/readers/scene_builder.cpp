@@ -51,6 +51,7 @@ TriangleMesh submesh(const TriangleMesh& mesh, const std::vector<Range>& ranges,
     if (!mesh.normals.empty()) result.normals.push_back(mesh.normals[vertex]);
     if (!mesh.uvs.empty()) result.uvs.push_back(mesh.uvs[vertex]);
     if (!mesh.colors.empty()) result.colors.push_back(mesh.colors[vertex]);
+    if (!mesh.tangents.empty()) result.tangents.push_back(mesh.tangents[vertex]);
     new_index[vertex] = kUnused;
   }
   return result;

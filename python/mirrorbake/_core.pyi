@@ -582,12 +582,14 @@ class TriangleMesh:
     Triangles with optional vertex normals, texture coordinates and parts. World space, metres.
     """
 
-    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, parts: Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, colors: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None) -> None:
+    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)] | None = None, parts: Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, colors: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None, tangents: Annotated[NDArray[numpy.float32], dict(shape=(None, 4), order='C', device='cpu', writable=False)] | None = None) -> None:
         """
         Copies positions (V, 3), triangles (T, 3) of vertex indices, counter-clockwise seen from
         outside, unit normals (V, 3) (default: flat shading), uvs (V, 2) with v up, the part of each triangle
-        (T,), and colours (V, 3) in [0, 1], linear, that multiply the material's albedo. Raises InvalidArgument
-        for anything not finite, indices out of range or a mesh without area.
+        (T,), colours (V, 3) in [0, 1], linear, that multiply the material's albedo, and tangents (V, 4) of normal
+        textures: the unit direction in which u grows and the sign of the bitangent, ±1, or zeros for none (default:
+        from the coordinates). Raises InvalidArgument for anything not finite, indices out of range or a mesh without
+        area.
         """
 
     @property
@@ -614,9 +616,15 @@ class TriangleMesh:
     def colors(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
         """Colours of the vertices, (V, 3), linear, or (0, 3) if they have none."""
 
+    @property
+    def tangents(self) -> Annotated[NDArray[numpy.float32], dict(writable=False)]:
+        """
+        Tangents of normal textures, (V, 4): direction of u and sign of the bitangent; or (0, 4).
+        """
+
     def __getstate__(self) -> tuple: ...
 
-    def __setstate__(self, arg: tuple[Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)]], /) -> None: ...
+    def __setstate__(self, arg: tuple[Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.uint16], dict(shape=(None,), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float32], dict(shape=(None, 4), order='C', device='cpu', writable=False)]], /) -> None: ...
 
     def __repr__(self) -> str: ...
 

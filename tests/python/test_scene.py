@@ -193,10 +193,38 @@ def test_shapes_have_their_extent(
     assert mesh.normals.shape == mesh.positions.shape
 
 
+def test_tangents_are_unit_vectors_with_a_sign_or_zeros() -> None:
+    for tangent, is_right in (
+        ((1, 0, 0, 1), True),
+        ((0, 0, 0, 0), True),
+        ((1, 0, 0, 0.5), False),
+        ((0, 2, 0, 1), False),
+    ):
+        tangents = np.tile(np.array(tangent, np.float32), (3, 1))
+        if is_right:
+            mesh = _core.TriangleMesh(TRIANGLE, INDICES, tangents=tangents)
+            np.testing.assert_array_equal(mesh.tangents, tangents)
+            continue
+        with pytest.raises(_core.InvalidArgument, match="tangent 0 is .* expected a unit vector"):
+            _core.TriangleMesh(TRIANGLE, INDICES, tangents=tangents)
+    with pytest.raises(_core.InvalidArgument, match="tangent count is 2"):
+        _core.TriangleMesh(TRIANGLE, INDICES, tangents=np.zeros((2, 4), np.float32))
+
+
 def test_meshes_materials_and_options_pickle_and_copy() -> None:
-    mesh = _core.make_sphere((0, 1, 0), 0.5, 8)
+    sphere = _core.make_sphere((0, 1, 0), 0.5, 8)
+    tangents = np.tile(np.array([0, 0.6, 0.8, -1], np.float32), (len(sphere.positions), 1))
+    mesh = _core.TriangleMesh(
+        sphere.positions,
+        sphere.triangles,
+        sphere.normals,
+        sphere.uvs,
+        None,
+        np.abs(sphere.positions) / 2,
+        tangents,
+    )
     for again in (pickle.loads(pickle.dumps(mesh)), copy.copy(mesh), copy.deepcopy(mesh)):
-        for name in ("positions", "normals", "uvs", "triangles", "parts", "colors"):
+        for name in ("positions", "normals", "uvs", "triangles", "parts", "colors", "tangents"):
             np.testing.assert_array_equal(getattr(again, name), getattr(mesh, name))
     metal = _core.Fresnel("conductor", eta=(0.2, 0.9, 1.4), k=(3.9, 2.5, 1.6))
     material = _core.Material(name="gold", specular=True, fresnel=metal, lobe="ggx", opacity_cutoff=0.25)

@@ -68,14 +68,18 @@ def test_what_only_some_meshes_have_is_completed() -> None:
         normals=up,
         uvs=np.full((3, 2), 0.5, np.float32),
         colors=np.full((3, 3), 0.25, np.float32),
+        tangents=np.tile(np.array([0.8, -0.6, 0.0, -1.0], np.float32), (3, 1)),
     )
     scene.add_object("bare", mesh(2.0), red)
     scene.add_object("full", full, red)
     joined, _, _ = scene.join_objects(8)
-    # Of the mesh without normals those of its facets, (0, 0) and white.
+    # Of the mesh without normals those of its facets, (0, 0), white and no tangents.
     np.testing.assert_allclose(joined.normals, np.concatenate([np.tile([0, 1, 0], (3, 1)), up]))
     np.testing.assert_array_equal(joined.uvs, [[0, 0]] * 3 + [[0.5, 0.5]] * 3)
     np.testing.assert_array_equal(joined.colors, [[1, 1, 1]] * 3 + [[0.25] * 3] * 3)
+    np.testing.assert_array_equal(
+        joined.tangents, [[0] * 4] * 3 + [[np.float32(0.8), np.float32(-0.6), 0, -1]] * 3
+    )
 
 
 def test_a_scene_without_objects_is_an_error() -> None:

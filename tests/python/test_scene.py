@@ -205,7 +205,7 @@ def test_tangents_are_unit_vectors_with_a_sign_or_zeros() -> None:
             mesh = _core.TriangleMesh(TRIANGLE, INDICES, tangents=tangents)
             np.testing.assert_array_equal(mesh.tangents, tangents)
             continue
-        with pytest.raises(_core.InvalidArgument, match="tangent 0 is .* expected a unit vector"):
+        with pytest.raises(_core.InvalidArgument, match=r"tangent 0 is .* expected a unit vector"):
             _core.TriangleMesh(TRIANGLE, INDICES, tangents=tangents)
     with pytest.raises(_core.InvalidArgument, match="tangent count is 2"):
         _core.TriangleMesh(TRIANGLE, INDICES, tangents=np.zeros((2, 4), np.float32))
@@ -214,13 +214,14 @@ def test_tangents_are_unit_vectors_with_a_sign_or_zeros() -> None:
 def test_meshes_materials_and_options_pickle_and_copy() -> None:
     sphere = _core.make_sphere((0, 1, 0), 0.5, 8)
     tangents = np.tile(np.array([0, 0.6, 0.8, -1], np.float32), (len(sphere.positions), 1))
+    colors = np.full((len(sphere.positions), 3), 0.25, np.float32)
     mesh = _core.TriangleMesh(
         sphere.positions,
         sphere.triangles,
         sphere.normals,
         sphere.uvs,
         None,
-        np.abs(sphere.positions) / 2,
+        colors,
         tangents,
     )
     for again in (pickle.loads(pickle.dumps(mesh)), copy.copy(mesh), copy.deepcopy(mesh)):

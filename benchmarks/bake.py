@@ -80,7 +80,7 @@ def drawing() -> Iterator[Case]:
     traced = time.perf_counter() - start
     box = core.Proxy.box((0.0, 2.0, 0.0), (2.0, 2.0, 2.0), (0.0, 1.0, 0.0))
     map_size = core.TexelTopology.cube(64)
-    texels, _ = core.fit_display(
+    texels, _, _ = core.fit_display(
         [core.DisplayView(lookups, targets)], [[core.FitShell(box, 0)]], [map_size], run_time=model
     )
     fitted = time.perf_counter() - start - traced

@@ -29,7 +29,20 @@ struct OwnedDisplayView {
   const ViewTargets* targets;
   std::vector<std::pair<int, float>> nodes;
   float weight;
+  nb::object render;
 };
+
+// Fits run without the interpreter's lock, which a renderer takes for each of its pictures.
+MapRenderer renderer_of(const nb::object& render) {
+  if (render.is_none()) return {};
+  return [&render](std::span<const float> texels) {
+    const nb::gil_scoped_acquire locked;
+    std::vector<float> maps(texels.begin(), texels.end());
+    const std::size_t count = maps.size() / 4;
+    const auto picture = nb::cast<FloatArray>(render(to_numpy(std::move(maps), {count, 4})));
+    return std::vector<float>(picture.data(), picture.data() + picture.size());
+  };
+}
 
 void bind_targets(nb::module_& m) {
   nb::class_<ViewTargets>(
@@ -66,17 +79,22 @@ of the reflector that the shell leaves out, or None if it covers all.)");
       .def(
           "__init__",
           [](OwnedDisplayView* self, const SurfaceSamples& lookups, const ViewTargets& targets,
-             std::vector<std::pair<int, float>> nodes, float weight) {
-            new (self) OwnedDisplayView{&lookups, &targets, std::move(nodes), weight};
+             std::vector<std::pair<int, float>> nodes, float weight, nb::object render) {
+            new (self) OwnedDisplayView{&lookups, &targets, std::move(nodes), weight, std::move(render)};
           },
           nb::arg("lookups"), nb::arg("targets"),
           nb::arg("nodes") = std::vector<std::pair<int, float>>{{0, 1.0F}}, nb::arg("weight") = 1.0F,
-          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
+          nb::arg("render") = nb::none(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
           signature<R"(def __init__(self, lookups: SurfaceSamples, targets: ViewTargets,
-nodes: collections.abc.Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0) -> None)">(),
+nodes: collections.abc.Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0,
+render: collections.abc.Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]] | None = None)
+-> None)">(),
           R"(lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at
 RunTimeModel.places). nodes: whose maps are blended for the view, with their weights. weight: of its
-rows, >= 0.)");
+rows, >= 0. render: draws the view with the texels of all maps of a node, float32 (texels, 4), premultiplied
+radiance and alpha, all levels as given, and returns float32 (lookups, height, width, 4): the light that the
+object reflects, times coverage, and coverage, of each lookup of a pixel; the view's rows are then probed from
+such pictures. None: they are analytic.)");
   nb::class_<DisplayFitOptions>(m, "DisplayFitOptions", "How maps are fitted to displayed pixels.")
       .def(
           "__init__",
@@ -98,6 +116,13 @@ rows, >= 0.)");
 }
 
 void bind_fit(nb::module_& m) {
+  nb::class_<ProbingReport> probing(m, "ProbingReport", "What probing the views of a fit took and left.");
+  probing.def_ro("renderings", &ProbingReport::renderings, "Pictures that were asked for.")
+      .def_ro("most_of_a_map", &ProbingReport::most_of_a_map,
+              "The most that one map of a view took at a time.")
+      .def_ro("unresolved", &ProbingReport::unresolved,
+              "Pixels that see the object and are left out, since they have no row.");
+  show(probing, {"renderings", "most_of_a_map", "unresolved"});
   m.def(
       "fit_display",
       [](const std::vector<const OwnedDisplayView*>& views,
@@ -106,8 +131,8 @@ void bind_fit(nb::module_& m) {
          std::optional<FloatMatrix> prior) {
         std::vector<DisplayView> display_views;
         for (const OwnedDisplayView* view : views) {
-          DisplayView& to =
-              display_views.emplace_back(DisplayView{view->lookups, view->targets, {}, view->weight});
+          DisplayView& to = display_views.emplace_back(
+              DisplayView{view->lookups, view->targets, {}, view->weight, renderer_of(view->render)});
           for (const auto& [node, weight] : view->nodes) to.nodes.push_back({node, weight});
         }
         std::vector<FitPart> fit_parts;
@@ -129,7 +154,7 @@ void bind_fit(nb::module_& m) {
         const std::size_t texels = fit.texels.size() / 4;
         std::vector<SolveReport> reports{fit.layers};
         reports.insert(reports.end(), fit.passes.begin(), fit.passes.end());
-        return nb::make_tuple(to_numpy(std::move(fit.texels), {texels, 4}), reports);
+        return nb::make_tuple(to_numpy(std::move(fit.texels), {texels, 4}), reports, fit.probing);
       },
       nb::arg("views"), nb::arg("parts"), nb::arg("maps"), nb::arg("nodes") = 1,
       nb::arg("run_time") = web_run_time(), nb::arg("options") = DisplayFitOptions{},
@@ -138,14 +163,14 @@ void bind_fit(nb::module_& m) {
 parts: collections.abc.Sequence[collections.abc.Sequence[FitShell]],
 maps: collections.abc.Sequence[TexelTopology], nodes: int = 1, run_time: RunTimeModel = ...,
 options: DisplayFitOptions = ..., prior: numpy.typing.NDArray[numpy.float32] | None = None) ->
-tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport]])">(),
+tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport], ProbingReport])">(),
       R"(Infers the maps of all shells and parts, of one or several nodes, together, from the pixels that
 the run time will show.
 
 parts: the shells of each part, front to back, in the order of the traced shells; the last is opaque.
 prior: float32 (nodes * texels, 3) or None. Returns the maps, float32 (nodes * texels, 4), premultiplied
-radiance and alpha, those of a node stacked in the order of `maps`; and reports of the layers' own fit,
-then of each pass.)");
+radiance and alpha, those of a node stacked in the order of `maps`; reports of the layers' own fit, then of
+each pass; and what probing the views that have a renderer took.)");
 }
 
 void bind_layer_inference(nb::module_& m) {

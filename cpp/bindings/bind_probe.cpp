@@ -21,7 +21,9 @@ void bind_probe(nb::module_& m) {
           "float32 (rows,): largest error of pictures of random texels, relative to the scale.")
       .def_ro("renderings", &ProbedMatrix::renderings, "How many pictures were drawn.")
       .def_ro("colours", &ProbedMatrix::colours, "Groups of texels, no two of one group in any row.")
-      .def_ro("unresolved", &ProbedMatrix::unresolved, "Pixels that see the map and have no row.");
+      .def_prop_ro(
+          "unresolved", [](const ProbedMatrix& self) { return self.missing.size(); },
+          "How many pixels see the map and have no row.");
 
   m.def(
       "probe_rendering_matrix",

@@ -1893,11 +1893,14 @@ class FitShell:
 class DisplayView:
     """A traced view, as the run time will look up its maps."""
 
-    def __init__(self, lookups: SurfaceSamples, targets: ViewTargets, nodes: Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0) -> None:
+    def __init__(self, lookups: SurfaceSamples, targets: ViewTargets, nodes: Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0, render: Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]] | None = None) -> None:
         """
         lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at
         RunTimeModel.places). nodes: whose maps are blended for the view, with their weights. weight: of its
-        rows, >= 0.
+        rows, >= 0. render: draws the view with the texels of all maps of a node, float32 (texels, 4), premultiplied
+        radiance and alpha, all levels as given, and returns float32 (lookups, height, width, 4): the light that the
+        object reflects, times coverage, and coverage, of each lookup of a pixel; the view's rows are then probed from
+        such pictures. None: they are analytic.
         """
 
 class DisplayFitOptions:
@@ -1924,15 +1927,32 @@ class DisplayFitOptions:
         How often the rows' weights are taken from the model's own image, 1 to 16.
         """
 
-def fit_display(views: Sequence[DisplayView], parts: Sequence[Sequence[FitShell]], maps: Sequence[TexelTopology], nodes: int = 1, run_time: RunTimeModel = ..., options: DisplayFitOptions = ..., prior: numpy.typing.NDArray[numpy.float32] | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport]]:
+class ProbingReport:
+    """What probing the views of a fit took and left."""
+
+    @property
+    def renderings(self) -> int:
+        """Pictures that were asked for."""
+
+    @property
+    def most_of_a_map(self) -> int:
+        """The most that one map of a view took at a time."""
+
+    @property
+    def unresolved(self) -> int:
+        """Pixels that see the object and are left out, since they have no row."""
+
+    def __repr__(self) -> str: ...
+
+def fit_display(views: Sequence[DisplayView], parts: Sequence[Sequence[FitShell]], maps: Sequence[TexelTopology], nodes: int = 1, run_time: RunTimeModel = ..., options: DisplayFitOptions = ..., prior: numpy.typing.NDArray[numpy.float32] | None = None) -> tuple[numpy.typing.NDArray[numpy.float32], list[SolveReport], ProbingReport]:
     """
     Infers the maps of all shells and parts, of one or several nodes, together, from the pixels that
     the run time will show.
 
     parts: the shells of each part, front to back, in the order of the traced shells; the last is opaque.
     prior: float32 (nodes * texels, 3) or None. Returns the maps, float32 (nodes * texels, 4), premultiplied
-    radiance and alpha, those of a node stacked in the order of `maps`; and reports of the layers' own fit,
-    then of each pass.
+    radiance and alpha, those of a node stacked in the order of `maps`; reports of the layers' own fit, then of
+    each pass; and what probing the views that have a renderer took.
     """
 
 class LayerInference:
@@ -2038,7 +2058,7 @@ class ProbedMatrix:
 
     @property
     def unresolved(self) -> int:
-        """Pixels that see the map and have no row."""
+        """How many pixels see the map and have no row."""
 
 def probe_rendering_matrix(topology: TexelTopology | CubePyramidLayout, render: Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]], *, most_renderings: int = 64, step: float = 0.0, tolerance: float = 1e-4) -> ProbedMatrix:
     """

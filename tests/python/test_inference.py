@@ -167,7 +167,7 @@ def test_a_display_fit_shows_the_traced_ball(trace: mb.LayerTrace) -> None:
     parts = [[mb.FitShell(Proxy.ellipsoid((0, 0, 0), (1.1, 1.1, 1.1)), 0), mb.FitShell(PROXY, 1)]]
     maps = [mb.TexelTopology.cube(16)] * 2
     view = mb.DisplayView(trace.samples, targets)
-    texels, reports = mb.fit_display([view], parts, maps)
+    texels, reports, _ = mb.fit_display([view], parts, maps)
     assert texels.shape == (2 * LAYOUT.texels, 4)
     assert len(reports) == 1 + mb.DisplayFitOptions().passes
     local, distant = np.split(np.asarray(texels), 2)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/surface/lookup.hpp"
+#include "probed_rows.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -173,7 +175,15 @@ DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPa
   if (!prior.empty()) check_length("prior", prior.size(), 3 * texels, "nodes × texels × 3");
 
   std::vector<LayerRows> layers;
-  for (const DisplayView& view : views) layers.push_back(build_layer_rows(model, view));
+  std::vector<std::optional<ProbedView>> probed(views.size());
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (views[v].render) {
+      probed[v].emplace(model, views[v], options.probe);
+      layers.push_back(probed[v]->layer_rows());
+    } else {
+      layers.push_back(build_layer_rows(model, views[v]));
+    }
+  }
   MapSolution start = fit_layers(views, layers, model, nodes, options.solve, prior);
   std::vector<float> light(3 * texels), alpha(texels);
   for (std::size_t i = 0; i < texels; ++i) {
@@ -184,14 +194,21 @@ DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPa
   std::vector<DisplayRows> pixels;
   std::vector<JointRows> joint;
   std::vector<SolverView> solver_views;
+  DisplayFit fit;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    pixels.push_back(build_display_rows(model, views[v], blend(alpha, model, views[v].nodes, 1)));
+    const std::vector<float> opacity = blend(alpha, model, views[v].nodes, 1);
+    pixels.push_back(probed[v] ? probed[v]->display_rows(opacity)
+                               : build_display_rows(model, views[v], opacity));
     joint.push_back(stack(pixels[v], layers[v]));
+    if (!probed[v]) continue;
+    const ProbingReport& report = probed[v]->report();
+    fit.probing.renderings += report.renderings;
+    fit.probing.most_of_a_map = std::max(fit.probing.most_of_a_map, report.most_of_a_map);
+    fit.probing.unresolved += report.unresolved;
   }
   for (std::size_t v = 0; v < views.size(); ++v) solver_views.push_back({&joint[v].matrix, views[v].nodes});
   const MapSolver solver(solver_views, maps, nodes, options.solve);
 
-  DisplayFit fit;
   fit.layers = start.report;
   for (int pass = 0; pass < options.passes; ++pass) {
     std::vector<ViewTarget> wanted;

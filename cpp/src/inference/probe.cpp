@@ -387,13 +387,15 @@ ProbedMatrix probe_rendering_matrix(const TexelTopology& topology, const TestRen
     const float* scale = calibration.scales.data() + 3 * r;
     const auto entries = static_cast<float>(candidates.row_offsets[r + 1] - candidates.row_offsets[r]);
     const float stepped = options.step * entries / std::min({scale[0], scale[1], scale[2]});
-    if (errors[r] > options.tolerance + stepped) continue;
+    if (errors[r] > options.tolerance + stepped) {
+      probed.missing.push_back(calibration.pixels[r]);
+      continue;
+    }
     kept.push_back(r);
     probed.matrix.row_pixels.push_back(calibration.pixels[r]);
     probed.scales.insert(probed.scales.end(), scale, scale + 3);
     probed.errors.push_back(errors[r]);
   }
-  probed.unresolved = rows - kept.size();
   build_rows(probed.matrix, kept.size(), [&](std::size_t i, RowAccumulator& row) {
     const std::size_t r = kept[i];
     double sum = 0;

@@ -13,6 +13,7 @@ from mirrorbake.bake.analyze import analyze
 from mirrorbake.bake.choose_weights import with_chosen_weight
 from mirrorbake.bake.contents import contents_of, with_static_set
 from mirrorbake.bake.estimate import Estimate, estimate
+from mirrorbake.bake.renderers import renderer_named
 from mirrorbake.bake.sample import SampleBaker
 from mirrorbake.bake.workers import Counts, bake_into, bake_on_workers
 from mirrorbake.errors import OptionError, StoreError
@@ -109,6 +110,8 @@ def bake(
     for index in samples or ():
         if not 0 <= index < total:
             raise OptionError(f"sample {index}: expected 0 to {total - 1}")
+    if config.infer.renderer is not None:
+        renderer_named(config.infer.renderer)
     report(0, total, "preparing the scene")
     stage = replace(stage or prepare_stage(config), config=config)
     with _held(location, shared=samples is not None):
@@ -144,9 +147,20 @@ def bake(
         else:
             counts = _bake_here(stage, store, missing, report)
         unconverged = _unconverged(store, missing)
-    if counts.rejected:
-        summary.notes.append(f"{counts.rejected} traced samples were not finite and were left out")
+    summary.notes.extend(_words_of(counts))
     return replace(summary, clamped=counts.clamped, unconverged=unconverged)
+
+
+def _words_of(counts: Counts) -> list[str]:
+    words, probing = [], counts.probing
+    if counts.rejected:
+        words.append(f"{counts.rejected} traced samples were not finite and were left out")
+    if probing.renderings:
+        words.append(
+            f"probed from {probing.renderings} pictures, at most {probing.most_of_a_map} for a map; "
+            f"{probing.unresolved} pixels of the object, whose lookups they do not tell, were left out"
+        )
+    return words
 
 
 def _bake_here(stage: Stage, store: PemStore, missing: Sequence[int], report: ProgressReport) -> Counts:

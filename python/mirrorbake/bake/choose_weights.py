@@ -52,7 +52,7 @@ def weight_decision(stage: Stage, contents: Contents) -> Decision:
     index = (len(space) - 1) // 2
     point, between = space.sample(index), space.middle_after(index)
     here = stage.at(point)
-    tracer, cameras = ViewTracer(stage, header), here.built.cameras
+    tracer, cameras = ViewTracer(stage, header, contents.local_triangles), here.built.cameras
     rows = [stripes_of(tracer, here, cameras.camera(point), STEP, phase, rows=1) for phase in range(STEP)]
     if header.is_static_set:
         # Its views are of a dome; the camera's own is none of them.

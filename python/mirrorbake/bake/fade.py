@@ -84,7 +84,7 @@ def held_out(
     pose = arranged(stage.config, header.space.scene_coordinates(point)).pose
     cameras = here.built.cameras
     place = cameras.angles_of(cameras.eye(point))
-    tracer, model = ViewTracer(stage, header), model_of(header.run_time)
+    tracer, model = ViewTracer(stage, header, contents.local_triangles), model_of(header.run_time)
     static_maps, maps, irradiance = contents.static_maps, baked.maps, baked.irradiance
     assert static_maps is not None
     if irradiance is None and contents.irradiance is not None:

@@ -13,14 +13,15 @@ from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.store import SolverReport
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.bake.renderers import Draw
     from mirrorbake.bake.targets import TracedView
     from mirrorbake.pem.header import Header
-    from mirrorbake.scene.config import Infer
+    from mirrorbake.scene.config_infer import Infer
     from mirrorbake.scene.pose import Pose
 
 
@@ -55,6 +56,8 @@ class DisplayFitter:
         self._options = _core.DisplayFitOptions(solve=solve_options(infer), passes=infer.passes)
         self._numbers = {entry.name: number for number, entry in enumerate(header.maps)}
         self._topologies = header.topologies
+        self.probing: _core.ProbingReport | None = None
+        """What probing the views of the last fit took."""
 
     def captured_prior(self, captured: Mapping[str, FloatArray]) -> list[FloatArray]:
         """Return RGB of each map (T, 3): of shells that are captured their pyramids, else black."""
@@ -100,9 +103,15 @@ class DisplayFitter:
             ]
             for part in header.parts
         ]
-        texels, passes = _core.fit_display(
+        texels, passes, probing = _core.fit_display(
             [
-                _core.DisplayView(one.view.lookups, one.view.targets, list(one.nodes), one.weight)
+                _core.DisplayView(
+                    one.view.lookups,
+                    one.view.targets,
+                    list(one.nodes),
+                    one.weight,
+                    self._split(one.view.draw),
+                )
                 for one in views
             ],
             shells,
@@ -115,4 +124,12 @@ class DisplayFitter:
         last = passes[-1]
         report = SolverReport(last.iterations, float(last.relative_gradient), last.converged)
         ends = np.cumsum([topology.texels for topology in self._topologies])[:-1]
+        self.probing = probing
         return [np.split(maps, ends) for maps in np.split(np.asarray(texels), nodes)], report
+
+    def _split(self, prepare: Callable[[], Draw] | None) -> Callable[[FloatArray], FloatArray] | None:
+        if prepare is None:
+            return None
+        draw = prepare()
+        ends = np.cumsum([topology.texels for topology in self._topologies])[:-1]
+        return lambda texels: np.ascontiguousarray(draw(np.split(texels, ends)), np.float32)

@@ -117,6 +117,8 @@ def _static(stage: Stage, quality: Quality) -> tuple[int, str]:
         return 0, 'infer.fit = "layers" has none'
     if stage.space.changes_scene:
         return 0, "the scene changes"
+    if stage.config.infer.matrix == "probed":
+        return 0, "each of its views would take pictures of its own"
     if quality.static == 0:
         return 0, "far from the samples the nearest one is drawn"
     return quality.static, "far from the samples maps of a dome are drawn"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -84,6 +84,35 @@ def lit_sides(stage: Stage) -> int:
     return 2 if lit else 1
 
 
+class Probing(NamedTuple):
+    """What probing the views of fits took and left, with `infer.matrix = "probed"`."""
+
+    renderings: int = 0
+    """Pictures that the renderer drew."""
+    most_of_a_map: int = 0
+    """The most that one map of a view took at a time."""
+    unresolved: int = 0
+    """Pixels of the object that were left out, since the pictures do not tell what they read."""
+
+    @staticmethod
+    def of(report: _core.ProbingReport | None) -> Probing:
+        """Return the same of a fit."""
+        if report is None:
+            return Probing()
+        return Probing(report.renderings, report.most_of_a_map, report.unresolved)
+
+    def plus(self, other: Probing) -> Probing:
+        """Return what both took."""
+        return Probing(
+            self.renderings + other.renderings,
+            max(self.most_of_a_map, other.most_of_a_map),
+            self.unresolved + other.unresolved,
+        )
+
+
+NOTHING_PROBED = Probing()
+
+
 @dataclass(frozen=True)
 class BakedSample:
     """What is stored of a sample."""
@@ -97,6 +126,7 @@ class BakedSample:
     reports: Reports
     rejected: int = 0
     """Samples of the views fitted that were left out, since their light was not finite."""
+    probing: Probing = NOTHING_PROBED
 
 
 class SampleBaker:
@@ -112,7 +142,7 @@ class SampleBaker:
         self._topologies = contents.header.topologies
         self._infer = stage.config.infer
         if self._infer.fit == "display":
-            self._tracer = ViewTracer(stage, contents.header)
+            self._tracer = ViewTracer(stage, contents.header, contents.local_triangles)
             self._fitter = DisplayFitter(contents.header, self._infer, contents.local_triangles)
 
     def bake(self, index: int) -> BakedSample:
@@ -158,7 +188,17 @@ class SampleBaker:
             maps[name] = np.ascontiguousarray(mine[number][:, : header.maps[number].channels])
         seconds = Timings(middle - start, 0.0, time.perf_counter() - middle)
         rejected = sum(one.view.targets.rejected for one in views)
-        return BakedSample(maps, own.images, irradiance, seconds, dict.fromkeys(maps, report), rejected)
+        reports = dict.fromkeys(maps, report)
+        probing = self._fitter.probing
+        return BakedSample(
+            maps,
+            own.images,
+            irradiance,
+            seconds,
+            reports,
+            rejected,
+            Probing.of(probing),
+        )
 
     def _with_neighbours(self, index: int) -> tuple[list[int], list[FitView]]:
         """Return the nodes of the fit of a sample, and what it sees."""

@@ -162,7 +162,7 @@ def infer_static_set(
     """
     header = contents.header
     fitter = DisplayFitter(header, stage.config.infer, contents.local_triangles)
-    views = static_views(ViewTracer(stage, header), stage, report)
+    views = static_views(ViewTracer(stage, header, contents.local_triangles), stage, report)
     prior = None
     if stage.config.infer.prior == "captured":
         prior = fitter.captured_prior(captured_pyramids(stage, header, contents.capture))

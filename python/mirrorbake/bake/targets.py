@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.renderers import MapsView, renderer_named
 from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
+    from numpy.typing import NDArray
+
+    from mirrorbake.bake.renderers import Draw
     from mirrorbake.pem.header import Header
     from mirrorbake.scene.parameters import Point
     from mirrorbake.scene.stage import Stage
@@ -35,6 +40,8 @@ class TracedView:
     """Where the run time's lookups see the reflector."""
     targets: _core.ViewTargets
     images: ViewImages
+    draw: Callable[[], Draw] | None = None
+    """Gets the renderer ready by whose pictures the view's rows are probed; None: they are analytic."""
 
 
 class ViewTracer:
@@ -44,8 +51,12 @@ class ViewTracer:
     samples see the same.
     """
 
-    def __init__(self, stage: Stage, header: Header) -> None:
-        self._stage = stage
+    def __init__(
+        self, stage: Stage, header: Header, local_triangles: NDArray[np.uint8] | None = None
+    ) -> None:
+        self._stage, self._header, self._local_triangles = stage, header, local_triangles
+        name = stage.config.infer.renderer
+        self._renderer = None if name is None else renderer_named(name)
         self._parts, self._shells, self._stacks = len(header.parts), len(header.rules), header.stacks
         self._places = model_of(header.run_time).places
         width, height = stage.built.cameras.size
@@ -77,7 +88,10 @@ class ViewTracer:
             np.concatenate([band.coverage for band in bands]),
             np.concatenate([band.background for band in bands]),
         )
-        return TracedView(self._lookups(stage, camera, (0, 0, 0, 0)), targets, images)
+        whole = (0, 0, camera.width, camera.height)
+        return TracedView(
+            self._lookups(stage, camera, (0, 0, 0, 0)), targets, images, self._draw(stage, camera, whole)
+        )
 
     def stripe(self, stage: Stage, camera: _core.Camera, window: Window) -> TracedView | None:
         """Return what a part of a camera's view holds; None where it does not see the object."""
@@ -87,7 +101,12 @@ class ViewTracer:
         traced = stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(window))
         targets = self._targets(window[2], window[3])
         targets.add(traced.samples)
-        return TracedView(lookups, targets, images_of_trace(traced))
+        return TracedView(lookups, targets, images_of_trace(traced), self._draw(stage, camera, window))
+
+    def _draw(self, stage: Stage, camera: _core.Camera, window: Window) -> Callable[[], Draw] | None:
+        if self._renderer is None:
+            return None
+        return partial(self._renderer, MapsView(camera, window, stage, self._header, self._local_triangles))
 
     def _targets(self, width: int, height: int) -> _core.ViewTargets:
         return _core.ViewTargets(width, height, self._parts, self._shells, self._stacks)

@@ -6,7 +6,7 @@ import contextlib
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mirrorbake import _core
-from mirrorbake.bake.sample import SampleBaker
+from mirrorbake.bake.sample import Probing, SampleBaker
 from mirrorbake.errors import OptionError, StoreError
 from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.load import parse_config
@@ -31,10 +31,16 @@ class Counts(NamedTuple):
     """Values that float16 could not hold."""
     rejected: int = 0
     """Traced samples whose light was NaN or infinite."""
+    probing: Probing = Probing()
+    """Of views whose rows were probed."""
 
     def plus(self, other: Counts) -> Counts:
         """Return the sum."""
-        return Counts(self.clamped + other.clamped, self.rejected + other.rejected)
+        return Counts(
+            self.clamped + other.clamped,
+            self.rejected + other.rejected,
+            self.probing.plus(other.probing),
+        )
 
 
 def bake_into(store: PemStore, baker: SampleBaker, index: int) -> Counts:
@@ -44,7 +50,7 @@ def bake_into(store: PemStore, baker: SampleBaker, index: int) -> Counts:
     if baked.irradiance is not None:
         store.write_irradiance(index, baked.irradiance)
     clamped = store.write_view(index, baked.maps, baked.images, baked.timings, baked.reports)
-    return Counts(clamped, baked.rejected)
+    return Counts(clamped, baked.rejected, baked.probing)
 
 
 def bake_one(place: str, fingerprint: str, index: int, threads: int) -> Counts:

@@ -236,7 +236,7 @@ class SingleMaps:
             infer = stage.config.infer
             assert infer.passes is not None, "the scene has to be planned first"
             shells = [[_core.FitShell(layer.proxy, number)] for number in layer.map_of_part]
-            found, _ = _core.fit_display(
+            found, _, _ = _core.fit_display(
                 [_core.DisplayView(lookups, target.light)],
                 shells,
                 list(layer.topologies),

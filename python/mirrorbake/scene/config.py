@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from mirrorbake import _core
 from mirrorbake.proxy import FAMILIES
 from mirrorbake.scene.config_axes import SCENE_AXES, Light, Motion, scene_axes
+from mirrorbake.scene.config_infer import Infer
 from mirrorbake.scene.config_shells import Shells, ShellSection, check_shells
 from mirrorbake.scene.config_values import (
     AUTO,
@@ -255,40 +256,6 @@ class Trace(Section):
     """Diffuse light from other diffuse surfaces."""
     cache_rays: Annotated[int, Field(ge=1, le=65536)] = 64
     """Rays per vertex and bounce with which `cached` indirect light is gathered."""
-
-
-class Infer(Section):
-    """[infer]: how the maps are solved for."""
-
-    fit: Literal["layers", "display"] = "display"
-    """`display`: all shells and parts together, to the pixels that `run_time` will show, as a display shows
-    them. `layers`: every shell by itself, to the light that it holds, as [PEM] §4 does."""
-    run_time: Literal["Web", "Web1", "Reference"] = "Web"
-    """What draws the maps of fit = "display": 4 lookups a pixel with up to 4 taps, as the page does; one
-    lookup; 16 lookups."""
-    passes: Annotated[Annotated[int, Field(ge=1, le=16)] | None, *AUTO] = None
-    """Of fit = "display": how often its weights are taken from the fit's own image. "auto": by
-    `auto.quality`."""
-    neighbours: Annotated[Annotated[float, Field(ge=0, le=1)] | None, *AUTO] = None
-    """Of fit = "display": weight of the neighbouring samples' views in the fit of a sample. "auto": 0.3 where
-    they are close, by `auto.quality`."""
-    smoothness: Annotated[Annotated[float, Field(ge=0, le=1e6)] | None, *AUTO] = 3e-4
-    """Weight λ of differences between neighbouring texels: small fits the sampled view best, large lasts away
-    from it. "auto": by what is held out; `level_agreement` and `prior_weight` are scaled alike then."""
-    level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
-    """Weight λ of a texel's difference from the mean of the four below it in the pyramid."""
-    prior: Literal["smooth", "captured"] = "captured"
-    """What the distant map's texels that a view does not determine fall back to: a smooth fill, or the
-    captured surroundings."""
-    prior_weight: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
-    """Weight λ of the difference from the captured surroundings."""
-    footprint_scale: Annotated[float, Field(gt=0, le=4)] = 0.25
-    """Size of a lookup's footprint in pixels: 1 filters as graphics hardware does for one sample per pixel,
-    less is sharper for supersampled images."""
-    iterations: Annotated[int, Field(ge=0, le=100_000)] = 600
-    """At most, per layer and view."""
-    tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-3
-    """The solver stops when its gradient has shrunk to this fraction."""
 
 
 class Static(Section):

@@ -11,7 +11,8 @@ from mirrorbake.scene.config_shells import Shells, ShellSection
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from mirrorbake.scene.config import Infer, SceneConfig
+    from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.config_infer import Infer
 
 DECIDED_KEYS = (
     "reflector.parts",

@@ -163,7 +163,7 @@ class Lab:
         prior: FloatArray | None,
     ) -> tuple[FloatArray, bool]:
         """Infer maps jointly from weighted views: RGBA of all maps, and whether the last pass converged."""
-        texels, reports = _core.fit_display(
+        texels, reports, _ = _core.fit_display(
             [
                 _core.DisplayView(self.lookups(place, run_time), self.targets(place), weight=weight)
                 for place, weight in views

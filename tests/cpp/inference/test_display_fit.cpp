@@ -38,11 +38,11 @@ SurfaceSamples ball(int size, int samples_per_pixel, const Light& light) {
 }
 
 // Light of maps, so that some maps show it exactly.
-glm::vec4 from_maps(const std::vector<float>& texels, const SurfaceSamples& samples, std::size_t i,
-                    std::size_t k) {
+glm::vec4 from_maps(std::span<const float> texels, const SurfaceSamples& samples, std::size_t i,
+                    std::size_t k, const RunTimeModel& model = web_run_time()) {
   const FitShell& shell = kParts[samples.part[i]][k];
   glm::vec4 sum(0.0F);
-  for (const TexelWeight& read : lookup(samples, i, shell.proxy, kMap, web_run_time())) {
+  for (const TexelWeight& read : lookup(samples, i, shell.proxy, kMap, model)) {
     const float* texel =
         texels.data() + 4 * (static_cast<std::size_t>(shell.map) * kMap.texels() + read.texel);
     sum += read.weight * glm::vec4(texel[0], texel[1], texel[2], texel[3]);
@@ -65,11 +65,11 @@ float shown(float radiance) { return 1.055F * std::pow(radiance, 1.0F / 2.4F) - 
 
 // Root mean square of the difference between what is drawn from the maps and the targets, as displayed.
 double display_error(const SurfaceSamples& samples, const ViewTargets& targets,
-                     const std::vector<float>& texels) {
+                     const std::vector<float>& texels, const RunTimeModel& model = web_run_time()) {
   std::vector<glm::vec3> sum(static_cast<std::size_t>(samples.width * samples.height), glm::vec3(0.0F));
   for (std::size_t i = 0; i < samples.size(); ++i) {
     ShellComposite composite;
-    for (std::size_t k = 0; k < 2; ++k) composite.add(from_maps(texels, samples, i, k));
+    for (std::size_t k = 0; k < 2; ++k) composite.add(from_maps(texels, samples, i, k, model));
     sum[samples.pixel[i]] += samples.fresnel[i] * composite.light();
   }
   double squares = 0.0;
@@ -151,6 +151,67 @@ TEST(DisplayFit, FindsMapsOfAllShellsAndPartsThatShowTheTarget) {
       ASSERT_LE(fit.texels[i], 1.0F);
     }
   }
+}
+
+// A renderer of another filter, of which the fit sees nothing but pictures: the ball over nothing.
+MapRenderer renderer_of(const SurfaceSamples& samples, const RunTimeModel& model) {
+  return [&samples, &model](std::span<const float> texels) {
+    const auto pixels = static_cast<std::size_t>(samples.width * samples.height);
+    std::vector<float> picture(4 * pixels * static_cast<std::size_t>(samples.samples_per_pixel));
+    std::size_t lookup_number = 0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      lookup_number = i > 0 && samples.pixel[i] == samples.pixel[i - 1] ? lookup_number + 1 : 0;
+      ShellComposite composite;
+      for (std::size_t k = 0; k < 2; ++k) composite.add(from_maps(texels, samples, i, k, model));
+      const glm::vec3 light = samples.fresnel[i] * composite.light();
+      float* pixel = picture.data() + 4 * (lookup_number * pixels + samples.pixel[i]);
+      for (int c = 0; c < 3; ++c) pixel[c] = light[c];
+      pixel[3] = 1.0F;
+    }
+    return picture;
+  };
+}
+
+TEST(DisplayFit, FindsMapsForARendererFromItsPictures) {
+  RunTimeModel model = web_run_time();
+  model.filter = LookupFilter::trilinear;
+  model.footprint_scale = 3.0F;
+  const std::vector<float> truth = random_maps(7);
+  const SurfaceSamples samples = ball(48, 4, [&](const SurfaceSamples& s, std::size_t i, std::size_t k) {
+    return from_maps(truth, s, i, k, model);
+  });
+  const ViewTargets targets = targets_of(samples);
+  DisplayView view{&samples, &targets};
+  const DisplayFit by_formula = fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), precise());
+  EXPECT_EQ(by_formula.probing.renderings, 0);
+  view.render = renderer_of(samples, model);
+  const DisplayFit by_pictures = fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), precise());
+  EXPECT_LE(by_pictures.probing.most_of_a_map, 64);
+  // Two maps in front, and the one that they share probed once more behind them.
+  EXPECT_LE(by_pictures.probing.renderings, 4 * by_pictures.probing.most_of_a_map);
+  EXPECT_LE(by_pictures.probing.unresolved, targets.width() * targets.height() / 50U);
+  // As near as by the formula of its own filter, in spite of F whose channels differ within a pixel.
+  EXPECT_LT(display_error(samples, targets, by_pictures.texels, model), 8e-3);
+  EXPECT_GT(display_error(samples, targets, by_formula.texels, model), 2e-2);
+}
+
+TEST(DisplayFit, RefusesARendererThatMapsTones) {
+  const std::vector<float> truth = random_maps(8);
+  const SurfaceSamples samples = ball(24, 4, [&](const SurfaceSamples& s, std::size_t i, std::size_t k) {
+    return from_maps(truth, s, i, k);
+  });
+  const ViewTargets targets = targets_of(samples);
+  DisplayView view{&samples, &targets};
+  const RunTimeModel model = web_run_time();
+  const MapRenderer linear = renderer_of(samples, model);
+  view.render = [&](std::span<const float> texels) {
+    std::vector<float> picture = linear(texels);
+    for (float& value : picture) value = std::sqrt(value);
+    return picture;
+  };
+  EXPECT_THROW(fit_display({&view, 1}, kParts, kMaps, 1, web_run_time()), InvalidArgument);
+  view.render = [](std::span<const float>) { return std::vector<float>(12); };
+  EXPECT_THROW(fit_display({&view, 1}, kParts, kMaps, 1, web_run_time()), InvalidArgument);
 }
 
 // Light that no map can show, different in every sample: fitting the pixel spends the texels on what is seen

@@ -72,8 +72,8 @@ TEST(Probe, FindsEveryEntryOfARendererWithoutLookingInside) {
     const ProbedMatrix probed = probe_rendering_matrix(topology, renderer);
     EXPECT_EQ(probed.renderings, calls);
     EXPECT_LE(calls, 64);
-    EXPECT_EQ(probed.matrix.rows() + probed.unresolved, renderer.matrix.rows());
-    EXPECT_LE(probed.unresolved, renderer.matrix.rows() / 100);
+    EXPECT_EQ(probed.matrix.rows() + probed.missing.size(), renderer.matrix.rows());
+    EXPECT_LE(probed.missing.size(), renderer.matrix.rows() / 100);
     // Values of up to 1.25 in float32, the constant taken off, over a tint of 0.4.
     EXPECT_GE(largest_difference(renderer.matrix, probed.matrix), 0.0F);
     EXPECT_LE(largest_difference(renderer.matrix, probed.matrix), 2e-6F);
@@ -103,7 +103,7 @@ TEST(Probe, NoticesARendererThatReadsElsewhereThanItSeems) {
   };
   const ProbedMatrix probed = probe_rendering_matrix(topology, odd);
   // What is left reads the same texels on both ways, if any.
-  EXPECT_GE(probed.unresolved, usual.matrix.rows() * 9 / 10);
+  EXPECT_GE(probed.missing.size(), usual.matrix.rows() * 9 / 10);
 }
 
 TEST(Probe, OfEightBitsIsAsGoodAsItsSteps) {
@@ -112,7 +112,7 @@ TEST(Probe, OfEightBitsIsAsGoodAsItsSteps) {
   const KnownRenderer renderer{fragments(topology, web_run_time()), glm::vec3(1.0F), 0.0F, step};
   const ProbedMatrix probed = probe_rendering_matrix(topology, renderer, {.step = step});
   // At the rim of the sphere footprints are wide, and their weights less than a step.
-  EXPECT_LE(probed.unresolved, renderer.matrix.rows() / 4);
+  EXPECT_LE(probed.missing.size(), renderer.matrix.rows() / 4);
   // Half a step each for what is lit, and as much for the sum that the row is divided by.
   EXPECT_LE(largest_difference(renderer.matrix, probed.matrix), 8.0F * step);
 }
@@ -122,8 +122,8 @@ TEST(Probe, SaysWhichPixelsItCouldNotResolve) {
   const KnownRenderer renderer{fragments(topology, reference_run_time())};
   const ProbedMatrix few = probe_rendering_matrix(topology, renderer, {.most_renderings = 20});
   EXPECT_LE(few.renderings, 20);
-  EXPECT_GT(few.unresolved, 0u);
-  EXPECT_EQ(few.matrix.rows() + few.unresolved, renderer.matrix.rows());
+  EXPECT_GT(few.missing.size(), 0u);
+  EXPECT_EQ(few.matrix.rows() + few.missing.size(), renderer.matrix.rows());
   EXPECT_LE(largest_difference(renderer.matrix, few.matrix), 2e-6F);
 }
 
@@ -142,7 +142,7 @@ TEST(Probe, OfABlackPictureHasNoRows) {
   const ProbedMatrix probed = probe_rendering_matrix(
       TexelTopology::cube(4), [](std::span<const float>) { return std::vector<float>(12, 0.5F); });
   EXPECT_EQ(probed.matrix.rows(), 0u);
-  EXPECT_EQ(probed.unresolved, 0u);
+  EXPECT_EQ(probed.missing.size(), 0u);
 }
 
 TEST(Probe, RefusesRenderersThatAreNone) {

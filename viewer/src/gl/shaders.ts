@@ -82,7 +82,7 @@ void main() {
 }
 
 /// Reads of a map: needs the samplers uRadiance and uAlpha, and uLayer: 1 / size of a layer in texels.
-const READS = `
+export const READS = `
 uniform sampler2DArray uRadiance;
 uniform sampler2DArray uAlpha;
 uniform vec2 uLayer;

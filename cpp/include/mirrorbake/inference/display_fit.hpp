@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "mirrorbake/inference/map_solver.hpp"
+#include "mirrorbake/inference/probe.hpp"
 #include "mirrorbake/inference/view_targets.hpp"
 #include "mirrorbake/proxy/proxy.hpp"
 #include "mirrorbake/surface/run_time_model.hpp"
@@ -26,12 +29,21 @@ struct FitShell {
 /// from its own and all further shells.
 using FitPart = std::vector<FitShell>;
 
+/// Draws a view from maps: texels of one node's maps, one behind the other, × 4, premultiplied radiance and
+/// α; every mip level as given. Returns linear values, lookups × pixels × 4: the light that the object
+/// reflects, without its own, times coverage, and coverage; no tone mapping, no clamping. The pixel that is
+/// shown is the mean over the lookups, each a picture of its own, as of a multisampled or an enlarged one:
+/// what all of them read together would take too many colours to tell apart.
+using MapRenderer = std::function<std::vector<float>(std::span<const float> texels)>;
+
 /// A traced view, as the run time will look up its maps.
 struct DisplayView {
   const SurfaceSamples* lookups = nullptr;  ///< where the run time's lookups meet the reflector
   const ViewTargets* targets = nullptr;
   std::vector<NodeWeight> nodes = {{}};  ///< whose maps are blended for it
   float weight = 1.0F;                   ///< of its rows, ≥ 0
+  /// Its rows are probed from pictures of this renderer (`probe.hpp`); none: analytic, from the lookups.
+  MapRenderer render = {};
 };
 
 struct DisplayFitOptions {
@@ -42,6 +54,16 @@ struct DisplayFitOptions {
   float softening = 0.03F;
   /// How often the weights of the rows are taken from the model's own image, 1…16.
   int passes = 2;
+  /// Of views that are drawn by a renderer. Within a lookup F of a coloured mirror may change channel by
+  /// channel, which a row does not hold: a percent of that is let pass.
+  ProbeOptions probe = {.tolerance = 1e-2F};
+};
+
+/// What probing the views of a fit took and left.
+struct ProbingReport {
+  int renderings = 0;          ///< pictures that were asked for
+  int most_of_a_map = 0;       ///< the most that one map of a view took at a time
+  std::size_t unresolved = 0;  ///< pixels that see the object and are left out, since they have no row
 };
 
 struct DisplayFit {
@@ -49,6 +71,7 @@ struct DisplayFit {
   std::vector<float> texels;
   SolveReport layers;               ///< of the layers' own fit, which finds α and where to start
   std::vector<SolveReport> passes;  ///< of the joint fit
+  ProbingReport probing;
 };
 
 /// Row of a pixel: mean over its lookups of F · transmittance · reads, the transmittance Π(1 − α) of the

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
@@ -30,11 +31,11 @@ struct ProbeOptions {
 struct ProbedMatrix {
   /// A row per pixel that sees the map; it has no members. Its weights sum to 1.
   RenderingMatrix matrix;
-  std::vector<float> scales;   ///< rows × 3: what a white map shows there, less what a black one does
-  std::vector<float> errors;   ///< of each row, on texels that nothing was decided by, relative to its scale
-  int renderings = 0;          ///< asked for
-  int colours = 0;             ///< groups of texels that were lit at a time
-  std::size_t unresolved = 0;  ///< pixels that see the map and have no row
+  std::vector<float> scales;  ///< rows × 3: what a white map shows there, less what a black one does
+  std::vector<float> errors;  ///< of each row, on texels that nothing was decided by, relative to its scale
+  int renderings = 0;         ///< asked for
+  int colours = 0;            ///< groups of texels that were lit at a time
+  std::vector<std::uint32_t> missing;  ///< pixels that see the map and have no row, ascending
 };
 
 /// Finds the weights from few pictures. First where a pixel looks: pictures of maps whose texels show their

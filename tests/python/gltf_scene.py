@@ -113,3 +113,51 @@ SQUARE = np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], np.float32)
 SQUARE_TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
 SQUARE_UVS = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
 SQUARE_NORMALS = np.tile(np.array([0, 1, 0], np.float32), (4, 1))
+
+
+def pair_of_primitives(folder: Path) -> str:
+    """One glTF mesh of two primitives, a gold one and a matte one with a normal texture and tangents."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+    arrays = {
+        "POSITION": square,
+        "NORMAL": np.tile(np.array([0, 0, 1], np.float32), (4, 1)),
+        "TANGENT": np.tile(np.array([0.6, 0.8, 0, -1], np.float32), (4, 1)),
+        "TEXCOORD_0": square[:, :2],
+        "indices": np.array([0, 1, 2, 0, 2, 3], np.uint32),
+    }
+    types = {2: "VEC2", 3: "VEC3", 4: "VEC4"}
+    buffer, views, accessors = b"", [], []
+    for number, array in enumerate(arrays.values()):
+        views.append({"buffer": 0, "byteOffset": len(buffer), "byteLength": array.nbytes})
+        kind = (
+            {"type": types[array.shape[1]], "componentType": 5126} if array.ndim == 2 else {"type": "SCALAR"}
+        )
+        accessors.append({"bufferView": number, "count": len(array), "componentType": 5125} | kind)
+        buffer += array.tobytes()
+    attributes = {name: number for number, name in enumerate(arrays) if name != "indices"}
+    document = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "box"}],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": 4, "material": m} for m in (1, 0)]}],
+        "materials": [
+            {
+                "name": "cloth",
+                "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": [0.2, 0.4, 0.6, 1]},
+                "normalTexture": {"index": 0},
+            },
+            {
+                "name": "gold",
+                "pbrMetallicRoughness": {"roughnessFactor": 0, "baseColorFactor": [0.9, 0.7, 0.2, 1]},
+            },
+        ],
+        "textures": [{"source": 0}],
+        "images": [{"uri": "bump.png"}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(buffer), "uri": "pair.bin"}],
+    }
+    (folder / "bump.png").write_bytes(png(np.full((2, 2, 3), [128, 128, 255], np.uint8)))
+    (folder / "pair.bin").write_bytes(buffer)
+    (folder / "pair.gltf").write_text(json.dumps(document))
+    return str(folder / "pair.gltf")

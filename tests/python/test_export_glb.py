@@ -27,6 +27,8 @@ from mirrorbake.scene.load import parse_config
 from viewer_cases import case_scene, cases
 from web_tools import node_folder
 
+from .gltf_scene import pair_of_primitives
+
 ROOT = Path(__file__).parents[2]
 SCHEMA = json.loads((ROOT / "docs" / "reference" / "EXT_mirrorbake_pem.schema.json").read_text())
 SIZE = 16
@@ -61,7 +63,7 @@ class Glb:
     def accessor(self, number: int) -> Any:
         accessor = self.json["accessors"][number]
         dtype = {5126: "<f4", 5125: "<u4"}[accessor["componentType"]]
-        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[accessor["type"]]
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]
         values = np.frombuffer(self.view(accessor["bufferView"]), dtype)
         return values.reshape(accessor["count"], width)
 
@@ -99,10 +101,13 @@ def glb(path: Path) -> Glb:
     return Glb(path.read_bytes())
 
 
-def test_the_khronos_validator_finds_no_fault(path: Path) -> None:
-    folder = node_folder("tests/web")
+def assert_valid(path: Path) -> None:
     done = subprocess.run(
-        ["node", "validate.cjs", path], cwd=folder, capture_output=True, text=True, check=True
+        ["node", "validate.cjs", path],
+        cwd=node_folder("tests/web"),
+        capture_output=True,
+        text=True,
+        check=True,
     )
     issues = json.loads(done.stdout)
     assert issues["numErrors"] == 0, issues["messages"]
@@ -113,6 +118,10 @@ def test_the_khronos_validator_finds_no_fault(path: Path) -> None:
         "UNUSED_OBJECT",
         "IMAGE_NPOT_DIMENSIONS",
     }
+
+
+def test_the_khronos_validator_finds_no_fault(path: Path) -> None:
+    assert_valid(path)
 
 
 def test_the_extension_is_as_its_schema_says(glb: Glb) -> None:
@@ -338,6 +347,29 @@ def test_every_part_has_its_own_material_and_the_static_set_is_the_pems(tmp_path
         radiance = np.maximum(np.exp2(code["low"] + codes * step) - code["epsilon"], 0.0)
         bound = (np.maximum(expected, 0.0) + code["epsilon"]) * (2.0 ** (0.5 * step) - 1.0)
         assert (np.abs(radiance - np.maximum(expected, 0.0)) <= 1.001 * bound + 1e-6).all()
+
+
+def test_primitives_with_a_normal_texture_keep_their_tangents(tmp_path: Path) -> None:
+    config = parse_config(
+        {
+            "reflector": {"mesh": pair_of_primitives(tmp_path)},
+            "views": {"count": 1, "size": [24, 24]},
+            "maps": {"size": 8, "distant": "infinite"},
+            "trace": {"samples": 2, "indirect": "none"},
+            "auto": {"quality": "draft"},
+        },
+        "pair",
+    )
+    bake(config, tmp_path / "pem")
+    export_glb(PemStore.open(tmp_path / "pem"), build_scene(config), tmp_path / "pair.glb")
+    glb = Glb((tmp_path / "pair.glb").read_bytes())
+    by_material = {glb.json["materials"][p["material"]]["name"]: p for p in glb.primitives}
+    assert "TANGENT" not in by_material["gold"]["attributes"]
+    cloth = by_material["cloth"]
+    tangents = glb.accessor(cloth["attributes"]["TANGENT"])
+    used = tangents[glb.accessor(cloth["indices"])[:, 0]]
+    np.testing.assert_allclose(used, [[0.6, 0.8, 0.0, -1.0]] * 6, atol=1e-6)
+    assert_valid(tmp_path / "pair.glb")
 
 
 BOWL = """v -1 1 -1

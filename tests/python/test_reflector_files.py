@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,8 @@ from mirrorbake.errors import InputError
 from mirrorbake.scene.build import build_scene
 from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.load import DRAFT, load_config, parse_config
+
+from .gltf_scene import pair_of_primitives
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -77,55 +78,6 @@ def test_material_libraries_are_inputs_of_a_mesh_that_is_of_its_materials(tmp_pa
     assert list(hash_inputs(config)["reflector.mesh"]["files"]) == ["two.mtl"]
     other = parse_config({"reflector": {"mesh": path}, "material": {}}, "test")
     assert not hash_inputs(other)["reflector.mesh"]["files"]
-
-
-def pair_of_primitives(folder: Path) -> str:
-    """One glTF mesh of two primitives, a gold one and a matte one with a normal texture and tangents."""
-    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
-    arrays = {
-        "POSITION": square,
-        "NORMAL": np.tile(np.array([0, 0, 1], np.float32), (4, 1)),
-        "TANGENT": np.tile(np.array([0.6, 0.8, 0, -1], np.float32), (4, 1)),
-        "TEXCOORD_0": square[:, :2],
-        "indices": np.array([0, 1, 2, 0, 2, 3], np.uint32),
-    }
-    types = {2: "VEC2", 3: "VEC3", 4: "VEC4"}
-    buffer, views, accessors = b"", [], []
-    for number, array in enumerate(arrays.values()):
-        views.append({"buffer": 0, "byteOffset": len(buffer), "byteLength": array.nbytes})
-        kind = (
-            {"type": types[array.shape[1]], "componentType": 5126} if array.ndim == 2 else {"type": "SCALAR"}
-        )
-        accessors.append({"bufferView": number, "count": len(array), "componentType": 5125} | kind)
-        buffer += array.tobytes()
-    attributes = {name: number for number, name in enumerate(arrays) if name != "indices"}
-    document = {
-        "asset": {"version": "2.0"},
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "name": "box"}],
-        "meshes": [{"primitives": [{"attributes": attributes, "indices": 4, "material": m} for m in (1, 0)]}],
-        "materials": [
-            {
-                "name": "cloth",
-                "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": [0.2, 0.4, 0.6, 1]},
-                "normalTexture": {"index": 0},
-            },
-            {
-                "name": "gold",
-                "pbrMetallicRoughness": {"roughnessFactor": 0, "baseColorFactor": [0.9, 0.7, 0.2, 1]},
-            },
-        ],
-        "textures": [{"source": 0}],
-        "images": [{"uri": "bump.exr"}],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": len(buffer), "uri": "pair.bin"}],
-    }
-    flat = np.full((2, 2, 3), [0.5, 0.5, 1.0], np.float32)
-    _core.save_image(str(folder / "bump.exr"), flat, ["R", "G", "B"])
-    (folder / "pair.bin").write_bytes(buffer)
-    (folder / "pair.gltf").write_text(json.dumps(document))
-    return str(folder / "pair.gltf")
 
 
 def test_every_primitive_of_a_mesh_keeps_its_material_and_tangents_turn_with_it(tmp_path: Path) -> None:

@@ -199,6 +199,20 @@ def _bumps() -> FloatArray:
     return (linear_codes((0.5 + 0.5 * lean).astype(np.float32)) / 255.0).astype(np.float32)
 
 
+def _tangents(normals: FloatArray, chosen: NDArray[np.bool_]) -> FloatArray:
+    """Of chosen vertices some that their coordinates know nothing of, mirrored; zeros of the others."""
+    along = np.cross(normals.astype(np.float64), (0.6, 0.0, 0.8))
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    tangents = np.concatenate([along / np.maximum(length, 1e-6), -np.ones_like(length)], axis=1)
+    tangents[~chosen | (length[:, 0] < 1e-3)] = 0.0
+    return tangents.astype(np.float32)
+
+
+def _turned(tangents: FloatArray, pose: Pose) -> FloatArray:
+    turned = tangents[:, :3].astype(np.float64) @ pose.rotation.T
+    return np.concatenate([turned.astype(np.float32), tangents[:, 3:]], axis=1)
+
+
 def _maps(seed: int, channels: int, size: int, projection: Projection = "cube") -> FloatArray:
     """A pyramid of smooth colours with some noise on every level of its own: wrong levels are seen."""
     random = np.random.default_rng(seed)
@@ -259,8 +273,9 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
         albedo=(0.4, 0.4, 0.4),
         layers="coated" if case.coated else "additive",
     )
-    uvs = colors = None
+    uvs = colors = tangents = None
     if case.textured:
+        tangents = _tangents(normals, np.arange(len(positions)) >= len(first))
         uvs = (6.0 * positions[:, [0, 2]]).astype(np.float32)
         colors = (0.75 + 0.25 * normals).astype(np.float32)
         use = _core.TextureReference
@@ -277,6 +292,7 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
         uvs,
         parts,
         colors,
+        None if tangents is None else _turned(tangents, pose),
     )
     number = scene.add_material(material)
     scene.add_object("object", mesh, number, ["ring", "ball"])
@@ -291,6 +307,7 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
         whole,
         np.zeros((0, 2), np.float32) if uvs is None else uvs,
         np.zeros((0, 3), np.float32) if colors is None else colors,
+        np.zeros((0, 4), np.float32) if tangents is None else tangents,
         np.zeros(len(triangles), np.uint16),
         irradiance(case, normals, 0),
     )

@@ -8,6 +8,8 @@ export interface Mesh {
   normals: Int16Array | null;
   uvs: Uint16Array | null;
   colors: Uint16Array | null;
+  /// Of each vertex the direction of u on an octahedron and the sign of the bitangent, or zeros.
+  tangents: Int16Array | null;
   /// Half floats: three for each vertex, or six with those of the back.
   irradiance: Uint16Array | null;
   indices: Uint32Array;
@@ -54,7 +56,7 @@ export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Pro
   if (payload.length !== mesh.bytes) {
     throw new UserError("damaged", "The mesh's file is damaged: it has another length than it should.");
   }
-  const { positions, indices, normals, uvs, colors, irradiance } = mesh.arrays;
+  const { positions, indices, normals, uvs, colors, tangents, irradiance } = mesh.arrays;
   const result = new Uint32Array(summed(new Int32Array(gather(payload, indices)), 1));
   if (result.some((index) => index >= positions.count)) {
     throw new UserError(
@@ -67,6 +69,7 @@ export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Pro
     normals: normals ? summed(new Int16Array(gather(payload, normals)), 2) : null,
     uvs: uvs ? summed(new Uint16Array(gather(payload, uvs)), 2) : null,
     colors: colors ? summed(new Uint16Array(gather(payload, colors)), 3) : null,
+    tangents: tangents ? summed(new Int16Array(gather(payload, tangents)), 3) : null,
     irradiance: irradiance ? new Uint16Array(gather(payload, irradiance)) : null,
     indices: result,
   };

@@ -185,6 +185,8 @@ export class Renderer {
     if (mesh.uvs) attribute(3, mesh.uvs as BufferSource, 2, gl.UNSIGNED_SHORT, true);
     if (mesh.colors) attribute(4, mesh.colors as BufferSource, 3, gl.UNSIGNED_SHORT, true);
     else gl.vertexAttrib3f(4, 1, 1, 1);
+    if (mesh.tangents) attribute(6, mesh.tangents as BufferSource, 3, gl.SHORT, true, 6);
+    else gl.vertexAttrib3f(6, 0, 0, 0);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices as BufferSource, gl.STATIC_DRAW);
     gl.bindVertexArray(null);

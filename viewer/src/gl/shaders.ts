@@ -28,6 +28,7 @@ layout(location = 2) in vec3 aIrradiance;
 layout(location = 3) in vec2 aUv;
 layout(location = 4) in vec3 aColor;
 layout(location = 5) in vec3 aBackIrradiance;
+layout(location = 6) in vec3 aTangent;
 uniform mat4 uClipFromWorld;
 uniform vec2 uShift;  // of the image, in clip space
 uniform vec3 uLow;
@@ -48,6 +49,7 @@ out vec3 vIrradiance;
 out vec3 vBackIrradiance;
 out vec2 vUv;
 out vec3 vColor;
+out vec4 vTangent;  // all 0: none
 
 vec3 fromOctahedron(vec2 e) {
   vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
@@ -64,6 +66,7 @@ void main() {
   vNormal = turned(fromOctahedron(aNormal));
   vUv = uUvLow + aUv * uUvExtent;
   vColor = aColor;
+  vTangent = aTangent.z == 0.0 ? vec4(0.0) : vec4(turned(fromOctahedron(aTangent.xy)), sign(aTangent.z));
   vIrradiance = aIrradiance;
   vBackIrradiance = aBackIrradiance;
   if (uIrradianceChanges) {
@@ -226,6 +229,7 @@ in vec3 vIrradiance;
 in vec3 vBackIrradiance;
 in vec2 vUv;
 in vec3 vColor;
+in vec4 vTangent;
 out vec4 oColour;
 ${READS}
 uniform vec3 uEye;
@@ -326,21 +330,26 @@ vec3 readTexture(sampler2D image, mat3x2 imageFromUv, vec2 uv, vec2 ux, vec2 uy)
 }
 
 // Tracer's front_normal with the texture of mapped_normal (glTF 2.0 §3.9.3): v of the coordinates counts downwards, that of the
-// texels upwards. \`front\` is the geometric normal of the triangle's front.
-vec3 frontNormal(vec3 interpolated, vec3 front, vec2 uv, vec3 px, vec3 py, vec2 ux, vec2 uy) {
+// texels upwards. \`front\` is the geometric normal of the triangle's front. All corners of a triangle with tangents have the same
+// sign: between them it is ±1, and nearer to 0 where one has none.
+vec3 frontNormal(vec3 interpolated, vec4 tangent, vec3 front, vec2 uv, vec3 px, vec3 py, vec2 ux, vec2 uy) {
   vec3 n = uFlat || dot(interpolated, front) <= 0.0 ? front : normalize(interpolated);
-  float determinant = ux.x * uy.y - uy.x * ux.y;
-  if (!uTextured.z || determinant == 0.0) return n;
-  float turn = sign(determinant);
-  vec3 along = turn * (px * uy.y - py * ux.y);
+  if (!uTextured.z) return n;
+  vec3 along = tangent.xyz;
+  float side = sign(tangent.w);
+  if (abs(tangent.w) < 0.999) {
+    float determinant = ux.x * uy.y - uy.x * ux.y;
+    if (determinant == 0.0) return n;
+    float turn = sign(determinant);
+    along = turn * (px * uy.y - py * ux.y);
+    side = dot(cross(n, along), turn * (px * uy.x - py * ux.x)) < 0.0 ? -1.0 : 1.0;
+  }
   vec3 t = along - dot(along, n) * n;
   float size = length(t);
   if (!(size > 0.0)) return n;
   t /= size;
-  vec3 b = cross(n, t);
-  if (dot(b, turn * (px * uy.x - py * ux.x)) < 0.0) b = -b;
   vec3 texel = 2.0 * readTexture(uNormalTexture, uNormalFromUv, uv, ux, uy) - 1.0;
-  vec3 bent = uNormalScale * (texel.x * t + texel.y * b) + texel.z * n;
+  vec3 bent = uNormalScale * (texel.x * t + texel.y * side * cross(n, t)) + texel.z * n;
   return length(bent) > 1e-6 && dot(bent, front) > 0.0 ? normalize(bent) : n;
 }
 
@@ -379,6 +388,7 @@ vec4 readShell(int shell, vec3 p, vec3 r, vec3 pdx, vec3 rdx, vec3 pdy, vec3 rdy
 void main() {
   vec3 px = dFdx(vPosition), py = dFdy(vPosition);
   vec3 nx = dFdx(vNormal), ny = dFdy(vNormal);
+  vec4 tx = dFdx(vTangent), ty = dFdy(vTangent);
   vec2 ux = dFdx(vUv), uy = dFdy(vUv);
   vec3 reached = gl_FrontFacing ? vIrradiance : vBackIrradiance;
   vec3 ix = dFdx(reached), iy = dFdy(reached);
@@ -402,6 +412,7 @@ void main() {
   if (!(max(abs(pixels.x), abs(pixels.y)) < 0.25)) pixels = vec2(0.0);
   vec3 position = vPosition + pixels.x * px + pixels.y * py;
   vec3 normal = vNormal + pixels.x * nx + pixels.y * ny;
+  vec4 tangent = vTangent + pixels.x * tx + pixels.y * ty;
   vec2 uv = vUv + pixels.x * ux + pixels.y * uy;
   vec3 irradiance = max(reached + pixels.x * ix + pixels.y * iy, 0.0);
 
@@ -412,7 +423,7 @@ void main() {
   float side = gl_FrontFacing ? 1.0 : -1.0;
   float normalLength = max(length(normal), 1e-6);
   vec3 front = side * g;
-  vec3 outside = frontNormal(normal, front, uv, px, py, ux, uy);
+  vec3 outside = frontNormal(normal, tangent, front, uv, px, py, ux, uy);
   vec3 n = bend(view, side * outside, g);
   vec3 d = -view;
   vec3 r = normalize(2.0 * dot(n, view) * n - view);
@@ -435,7 +446,7 @@ void main() {
       float a = (p1 * e22 - p2 * e12) / determinant, b = (p2 * e11 - p1 * e12) / determinant;
       vec3 moved = normal + a * nx + b * ny;
       vec3 dn = uTextured.z
-        ? frontNormal(moved, front, uv + a * ux + b * uy, px, py, ux, uy) - outside
+        ? frontNormal(moved, tangent + a * tx + b * ty, front, uv + a * ux + b * uy, px, py, ux, uy) - outside
         : (a * nx + b * ny) / normalLength;
       dNormal = side * (dn - dot(dn, n) * n);
     }

@@ -221,6 +221,11 @@ def _add_mesh(
     colors = (
         file.add_vertices(np.asarray(mesh.colors, np.float32)) if len(mesh.colors) and any(tinted) else None
     )
+    # Zeros are no tangents; what no primitive with a normal texture reads may be any unit vector.
+    turned = np.array(mesh.tangents, np.float32)
+    is_turned = turned[:, 3] != 0.0
+    turned[~is_turned] = (1.0, 0.0, 0.0, 1.0)
+    tangents = file.add_vertices(turned) if is_turned.any() and len(mesh.normals) else None
     irradiance = store.read_irradiance()
     if irradiance is not None:
         attributes["_IRRADIANCE"] = file.add_vertices(np.ascontiguousarray(irradiance[:, :3]))
@@ -235,6 +240,9 @@ def _add_mesh(
             continue
         triangles = np.concatenate([built.triangles[chosen & stacked], built.triangles[chosen & ~stacked]])
         own = {"COLOR_0": colors} if colors is not None and tinted[material] else {}
+        bumpy = exported.materials[material].normal_texture is not None
+        if bumpy and tangents is not None and is_turned[built.triangles[chosen]].all():
+            own["TANGENT"] = tangents
         primitives.append(
             {
                 "attributes": {**attributes, **own},

@@ -32,6 +32,8 @@ class ReflectorMesh:
     """(V, 2) texture coordinates, v up, or (0, 2)."""
     colors: FloatArray
     """(V, 3) that multiply the albedo, in [0, 1], or (0, 3)."""
+    tangents: FloatArray
+    """(V, 4) unit direction of u and sign of the bitangent, or zeros, of normal textures; or (0, 4)."""
     materials: NDArray[np.uint16]
     """(T,) material of every triangle."""
     irradiance: FloatArray | None
@@ -102,6 +104,10 @@ def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
         arrays["uvs"], description["uvBounds"] = _quantised(np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1))
     if len(mesh.colors):
         arrays["colors"] = np.rint(np.clip(mesh.colors[used], 0.0, 1.0) * 65535.0).astype(np.uint16)
+    if len(mesh.tangents):
+        tangents = mesh.tangents[used]
+        signs = np.rint(32767.0 * np.sign(tangents[:, 3:])).astype(np.int16)
+        arrays["tangents"] = np.concatenate([octahedral(tangents[:, :3]), signs], axis=1)
     if mesh.irradiance is not None:
         arrays["irradiance"] = mesh.irradiance[used].astype(np.float16)
     payload, layout = _pack({name: _differences(array) for name, array in arrays.items()})

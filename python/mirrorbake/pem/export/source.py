@@ -168,6 +168,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
             whole_stack=whole,
             uvs=np.asarray(mesh.uvs) if materials.textures else np.zeros((0, 2), np.float32),
             colors=np.asarray(mesh.colors),
+            tangents=np.asarray(mesh.tangents),
             materials=np.array([numbers.index(number) for number in of_part], np.uint16)[built.parts],
             irradiance=first,
         ),

@@ -234,6 +234,38 @@ double quantile(std::vector<double>& values, double q) {
   return *middle;
 }
 
+/// Where most points lie within `width` of each other: the middle one of those. Sorts the values.
+double densest(std::vector<double>& values, double width) {
+  std::sort(values.begin(), values.end());
+  std::size_t first = 0;
+  std::size_t best = 0;
+  std::size_t most = 0;
+  for (std::size_t last = 0; last < values.size(); ++last) {
+    while (values[last] - values[first] > width) ++first;
+    if (last - first + 1 > most) {
+      most = last - first + 1;
+      best = first;
+    }
+  }
+  return values[best + most / 2];
+}
+
+/// Sides at the densest places of the hits before them. Unlike quantiles of the hits that a side takes by
+/// direction these find the far walls of a flat room, before which most hits are on floor and ceiling.
+Sides densest_sides(std::span<const glm::dvec3> hits, double width) {
+  Sides sides{};
+  for (int side = 0; side < 6; ++side) {
+    std::vector<double> distances;
+    for (const glm::dvec3& d : hits) {
+      const double distance = side_distance(d, side);
+      if (distance > 0) distances.push_back(distance);
+    }
+    if (!distances.empty()) sides[static_cast<std::size_t>(side)] = densest(distances, width);
+  }
+  fill_empty_sides(sides);
+  return sides;
+}
+
 }  // namespace
 
 glm::vec3 area_weighted_centroid(std::span<const glm::vec3> positions,
@@ -351,12 +383,16 @@ Box fit_box_robust(std::span<const glm::vec3> hits, glm::vec3 origin) {
   auto distances = distances_by_side(relative);
   Sides best{};
   double best_cost = std::numeric_limits<double>::infinity();
+  std::vector<Sides> starts{densest_sides(relative, threshold)};
   for (double q : {0.5, 0.75, 0.9, 0.98}) {
     Sides sides{};
     for (std::size_t side = 0; side < 6; ++side) {
       if (!distances[side].empty()) sides[side] = quantile(distances[side], q);
     }
     fill_empty_sides(sides);
+    starts.push_back(sides);
+  }
+  for (Sides sides : starts) {
     double last_cost = std::numeric_limits<double>::infinity();
     for (int round = 0; round < 50; ++round) {
       const double cost = box_cost(relative, sides, threshold);

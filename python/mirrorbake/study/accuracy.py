@@ -17,7 +17,9 @@ from mirrorbake import fresnel, projection
 from mirrorbake.evaluate.metrics import display_referred, psnr
 from mirrorbake.files import write_text
 from mirrorbake.pem.pyramid import join_pyramid, split_pyramid
+from mirrorbake.study.accuracy_fits import accuracy_of_fits
 from mirrorbake.study.accuracy_light import accuracy_of_light
+from mirrorbake.study.accuracy_maps import accuracy_of_maps
 from mirrorbake.study.accuracy_row import Accuracy
 from mirrorbake.study.fresnel import INDICES, rounding
 from mirrorbake.study.lobes import dark_room, lobe_errors, lobes, sunny_sky
@@ -43,7 +45,8 @@ def accuracy(cosines: int = 60, rays: int = 6) -> list[Accuracy]:
         Per shape, flatness and depth of a proxy.
     """
     measured = [_fresnel(cosines), _proxies(rays), _projections(), _prefilter(), _display(), _storage()]
-    return [row for rows in measured for row in rows] + accuracy_of_light()
+    rows = [row for rows in measured for row in rows]
+    return [*rows, *accuracy_of_maps(), *accuracy_of_light(), *accuracy_of_fits()]
 
 
 def _fresnel(cosines: int) -> list[Accuracy]:

@@ -205,6 +205,26 @@ TEST(FitBoxRobust, FindsTheRoom) {
   }
 }
 
+// As many hits on every side: those on floor and ceiling of a flat room lie before all of its far walls.
+TEST(FitBoxRobust, FindsFlatRooms) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+  for (float flat : {0.3F, 0.03F, 0.003F}) {
+    const glm::vec3 half(3.0F, 3.0F * flat, 2.0F);
+    std::vector<glm::vec3> hits;
+    for (int i = 0; i < 3000; ++i) {
+      glm::vec3 place(uniform(random), uniform(random), uniform(random));
+      place[i % 3] = i % 2 == 0 ? -1.0F : 1.0F;
+      hits.push_back(place * half);
+    }
+    const Box box = fit_box_robust(hits, {0, 0, 0});
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_NEAR(box.centre[axis], 0.0F, 1e-4F * half[axis]) << flat;
+      EXPECT_NEAR(box.half_extent[axis], half[axis], 1e-4F * half[axis]) << flat;
+    }
+  }
+}
+
 // A third of the rays end on furniture, one in ten far away behind a window. The mean-distance box is off by
 // decimetres; the robust one by at most centimetres, its threshold (1 % of the mean distance) times the odds
 // of outliers.

@@ -9,14 +9,21 @@ from numpy.typing import NDArray
 
 from mirrorbake.envmap import EnvMap
 
-SHADERS = Path(__file__).parents[1] / "viewer" / "src" / "gl" / "shaders.ts"
+SOURCES = Path(__file__).parents[1] / "viewer" / "src"
 
 
 def reads_of_the_page() -> str:
-    """The functions of the page's shader that read maps."""
-    found = re.search(r"const READS = `(.*?)`;", SHADERS.read_text(encoding="utf-8"), re.DOTALL)
+    """The functions of the page's shader that read cube maps."""
+    texts = (("gl/shaders.ts", "MAPS"), ("projection.ts", "CUBE"), ("gl/shaders.ts", "TAPS"))
+    return "".join(_text(SOURCES / file, name) for file, name in texts)
+
+
+def _text(path: Path, name: str) -> str:
+    found = re.search(
+        rf"^const {name} = `(.*?)`;", path.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
+    )
     if found is None:
-        raise ValueError(f"{SHADERS}: has no READS")
+        raise ValueError(f"{path}: has no {name}")
     return found.group(1)
 
 

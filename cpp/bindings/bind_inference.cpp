@@ -1,5 +1,6 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <optional>
@@ -67,10 +68,35 @@ the six faces (+X -X +Y -Y +Z -Z), in a face the rows from the top.)")
 faces: float32 (6, N, N, C). Returns float32 (texels, C): every level is the mean of the finer one's 2x2
 texels weighted by their solid angles ([EMT] section 2.4).)");
 
+  nb::class_<MapProjection>(m, "MapProjection", "A projection in which the maps of a PEM can be kept.")
+      .def_prop_ro(
+          "name", [](const MapProjection& p) { return std::string(p.name); }, "In scene files and in PEMs.")
+      .def_prop_ro(
+          "projection", [](const MapProjection& p) { return to_string({.kind = p.projection}); },
+          "Of the EnvMap that such a map is.")
+      .def_ro("faces", &MapProjection::faces)
+      .def_ro("faces_in_a_row", &MapProjection::faces_in_a_row, "Of a level in the images of the web format.")
+      .def_prop_ro(
+          "order", [](const MapProjection& p) { return std::string(p.order); },
+          "Of the faces, and of their texels, in words.");
+  m.def(
+      "map_projections",
+      [] {
+        nb::dict known;
+        for (const MapProjection& projection : map_projections()) {
+          known[nb::str(projection.name.data(), projection.name.size())] = projection;
+        }
+        return known;
+      },
+      nb::sig("def map_projections() -> dict[str, MapProjection]"),
+      "The projections in which the maps of a PEM can be kept, by the names that scene files have for them.");
+
   nb::class_<TexelTopology>(m, "TexelTopology",
                             R"(How the texels of a map with mip levels lie to each other. Numbered as the
 values of an EnvMap are: levels from the finest, in a level the faces, in a face the rows from the top.)")
       .def(nb::init_implicit<const CubePyramidLayout&>())
+      .def_static("of", &TexelTopology::of, nb::arg("projection"), nb::arg("size"),
+                  "Of a map kept in a projection; a power of two, 1 to 16384.")
       .def_static("cube", &TexelTopology::cube, nb::arg("size"), "Six faces; a power of two, 1 to 16384.")
       .def_static("dual_paraboloid", &TexelTopology::dual_paraboloid, nb::arg("size"),
                   "Two faces, front first; a power of two, 1 to 16384.")

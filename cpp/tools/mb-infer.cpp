@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <charconv>
 #include <iostream>
 #include <optional>
@@ -113,9 +114,13 @@ void Request::add_options(CLI::App& app) {
   app.add_option("--shell", shells,
                  std::string("where a shell's map lies, repeatable, front to back: ") + kShapes +
                      " (default: all at infinity)");
-  app.add_option("--to", projection, "projection of the maps: cube or dual_paraboloid")
+  std::vector<std::string> projections;
+  for (const MapProjection& known : map_projections()) {
+    projections.push_back(to_string(mirrorbake::Projection{.kind = known.projection}));
+  }
+  app.add_option("--to", projection, "projection of the maps")
       ->capture_default_str()
-      ->check(CLI::IsMember({"cube", "dual_paraboloid"}));
+      ->check(CLI::IsMember(projections));
   app.add_option("--size", size, "texels along a side of a face, a power of two")->capture_default_str();
   app.add_option("--run-time", run_time, "what will draw the maps: Web, Web1 or Reference")
       ->capture_default_str();
@@ -139,7 +144,8 @@ void Request::add_options(CLI::App& app) {
 LayerInferenceOptions Request::options() const {
   LayerInferenceOptions result;
   for (const std::string& shell : shells) result.shells.push_back(parse_shell(shell));
-  result.map = projection == "cube" ? TexelTopology::cube(size) : TexelTopology::dual_paraboloid(size);
+  result.map = TexelTopology::of(
+      *std::ranges::find(map_projections(), target().kind, &MapProjection::projection), size);
   result.run_time = run_time_model(run_time);
   result.sharing = per_part ? MapSharing::per_part : MapSharing::all_parts;
   result.fit = fit;

@@ -1651,6 +1651,33 @@ def build_cube_pyramid(faces: Annotated[NDArray[numpy.float32], dict(shape=(6, N
     texels weighted by their solid angles ([EMT] section 2.4).
     """
 
+class MapProjection:
+    """A projection in which the maps of a PEM can be kept."""
+
+    @property
+    def name(self) -> str:
+        """In scene files and in PEMs."""
+
+    @property
+    def projection(self) -> str:
+        """Of the EnvMap that such a map is."""
+
+    @property
+    def faces(self) -> int: ...
+
+    @property
+    def faces_in_a_row(self) -> int:
+        """Of a level in the images of the web format."""
+
+    @property
+    def order(self) -> str:
+        """Of the faces, and of their texels, in words."""
+
+def map_projections() -> dict[str, MapProjection]:
+    """
+    The projections in which the maps of a PEM can be kept, by the names that scene files have for them.
+    """
+
 class TexelTopology:
     """
     How the texels of a map with mip levels lie to each other. Numbered as the
@@ -1658,6 +1685,10 @@ class TexelTopology:
     """
 
     def __init__(self, arg: CubePyramidLayout, /) -> None: ...
+
+    @staticmethod
+    def of(projection: MapProjection, size: int) -> TexelTopology:
+        """Of a map kept in a projection; a power of two, 1 to 16384."""
 
     @staticmethod
     def cube(size: int) -> TexelTopology:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.envmap import EnvMap
+from mirrorbake.projection import MAP_PROJECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -91,10 +92,10 @@ def infer_maps(
     InvalidArgument
         For options that do not fit to the files.
     """
-    topologies = {"cube": _core.TexelTopology.cube, "dual_paraboloid": _core.TexelTopology.dual_paraboloid}
-    if projection not in topologies:
-        raise _core.InvalidArgument(f"projection is {projection!r}, expected cube or dual_paraboloid")
-    topology = topologies[projection](size)
+    kept = {entry.projection: entry for entry in MAP_PROJECTIONS.values()}
+    if projection not in kept:
+        raise _core.InvalidArgument(f"projection is {projection!r}, expected {' or '.join(kept)}")
+    topology = _core.TexelTopology.of(kept[projection], size)
     found = _core.infer_from_layers(
         list(layers),
         shells=list((shells or {}).items()),

@@ -15,9 +15,12 @@ from mirrorbake import _core
 from mirrorbake.arrays import real_array
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "MAP_PROJECTIONS",
     "directions_from_points",
     "dual_paraboloid_texture_matrix",
     "points_from_directions",
@@ -25,6 +28,9 @@ __all__ = [
     "texel_directions",
     "texel_solid_angles",
 ]
+
+MAP_PROJECTIONS: Mapping[str, _core.MapProjection] = _core.map_projections()
+"""Those in which the maps of a PEM can be kept, by their names in scene files."""
 
 
 def vectors(name: str, values: ArrayLike, components: int) -> NDArray[np.float32]:

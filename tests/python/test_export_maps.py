@@ -12,7 +12,7 @@ import pytest
 from mirrorbake import _core
 from mirrorbake.envmap import EnvMap
 from mirrorbake.errors import OptionError
-from mirrorbake.pem.export.frames import FRAMES, cube_from_paraboloid, move_proxy, turn_cube
+from mirrorbake.pem.export.frames import FRAMES, cube_from_levels, move_proxy, turn_cube
 from mirrorbake.pem.export.map_sets import MapSet, ShellMap
 from mirrorbake.pem.export.maps import export_maps
 from mirrorbake.proxy import proxy_from_attributes
@@ -259,7 +259,7 @@ def test_dual_paraboloids_become_cube_maps_that_lie_right(convention: str, tmp_p
     export_maps(
         [single(paraboloid(64))], tmp_path, convention=convention, precision="float32", report=said.append
     )
-    assert said == ["the maps are dual paraboloids: they were resampled, every level by itself"]
+    assert said == ["the maps are no cubes: they were resampled, every level by itself"]
     description = json.loads((tmp_path / "maps.json").read_text())
     (entry,) = description["sets"][0]["parts"][0]["shells"]
     assert (entry["projection"], entry["size"], entry["levels"]) == ("cube", 64, 7)
@@ -296,6 +296,6 @@ def test_a_cube_of_a_paraboloid_holds_the_levels_whose_texels_are_its_size() -> 
     maps = EnvMap(layout, values, ["R"])
     for level in range(4):
         s = size >> level
-        found = cube_from_paraboloid(maps, s)
+        found = cube_from_levels(maps, s)
         assert found[0, s // 2, s // 2, 0] == pytest.approx(level, abs=0.2)
         assert found[4, s // 2, s // 2, 0] == pytest.approx(max(level - 1, 0), abs=0.2)

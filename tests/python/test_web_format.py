@@ -2,7 +2,9 @@
 
 import gzip
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +16,8 @@ from mirrorbake.pem.export.mesh_file import ReflectorMesh, octahedral, write_mes
 from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_atlas, level_place, to_atlas
 from mirrorbake.pem.export.source import ExportSource
 from mirrorbake.pem.export.web import WebOptions, WebPem
-from mirrorbake.pem.pyramid import FACES, Projection
+from mirrorbake.pem.pyramid import topology_of
+from mirrorbake.projection import MAP_PROJECTIONS
 from viewer_cases import Case, CasePem, Scene, case_scene, case_source, cases, irradiance
 
 
@@ -49,13 +52,24 @@ def test_maps_that_are_black_have_a_code(bright: float) -> None:
     assert np.isfinite(code.table()).all()
 
 
-PROJECTIONS: tuple[Projection, ...] = ("cube", "paraboloid")
+PROJECTIONS = tuple(MAP_PROJECTIONS)
+PAGE_PROJECTIONS = Path(__file__).parents[2] / "viewer" / "src" / "projection.ts"
+
+
+def test_the_page_lays_the_faces_of_every_projection_as_the_exporter_does() -> None:
+    found = re.findall(
+        r"^  (\w+): mapProjection\({ faces: (\d+), across: (\d+), acrossEdge: (\w+)",
+        PAGE_PROJECTIONS.read_text(encoding="utf-8"),
+        re.MULTILINE,
+    )
+    ours = [(p.name, str(p.faces), str(p.faces_in_a_row)) for p in MAP_PROJECTIONS.values()]
+    assert [entry[:3] for entry in found] == ours
 
 
 @pytest.mark.parametrize("projection", PROJECTIONS)
 @pytest.mark.parametrize("size", [1, 2, 8, 64])
-def test_an_atlas_holds_every_texel_of_every_level_once(size: int, projection: Projection) -> None:
-    texels = sum(FACES[projection] * (size >> level) ** 2 for level in range(size.bit_length()))
+def test_an_atlas_holds_every_texel_of_every_level_once(size: int, projection: str) -> None:
+    texels = topology_of(projection, size).texels
     pyramid = np.random.default_rng(1).integers(0, 256, (texels, 3), np.uint8)
     atlas = to_atlas(pyramid, size, projection)
     assert atlas.shape == (*atlas_shape(size, projection), 3)
@@ -63,7 +77,7 @@ def test_an_atlas_holds_every_texel_of_every_level_once(size: int, projection: P
 
 
 @pytest.mark.parametrize(("projection", "rows", "columns"), [("cube", 2, 3), ("paraboloid", 1, 2)])
-def test_levels_of_an_atlas_do_not_overlap(projection: Projection, rows: int, columns: int) -> None:
+def test_levels_of_an_atlas_do_not_overlap(projection: str, rows: int, columns: int) -> None:
     size = 32
     taken = np.zeros(atlas_shape(size, projection), int)
     for level in range(size.bit_length()):
@@ -304,9 +318,9 @@ def test_an_exact_image_of_a_map_holds_its_codes(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("projection", PROJECTIONS)
-def test_blocks_of_an_atlas_hold_the_texels_that_are_read_and_hardly_more(projection: Projection) -> None:
+def test_blocks_of_an_atlas_hold_the_texels_that_are_read_and_hardly_more(projection: str) -> None:
     size = 32
-    count = sum(FACES[projection] * (size >> level) ** 2 for level in range(size.bit_length()))
+    count = topology_of(projection, size).texels
     read = np.zeros(count, np.bool_)
     read[[5, 700, count - 9]] = True
     blocks = blocks_of(read, size, projection)

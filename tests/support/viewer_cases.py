@@ -27,9 +27,10 @@ from mirrorbake.pem.export.mesh_file import ReflectorMesh
 from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_atlas
 from mirrorbake.pem.export.source import ExportSource, MapEntry, Part, Shell
 from mirrorbake.pem.export.web import WebOptions, WebPem
-from mirrorbake.pem.pyramid import FACES, Projection, topology_of
+from mirrorbake.pem.pyramid import topology_of
 from mirrorbake.pem.run_time import diffuse_of, fade_weight
 from mirrorbake.pem.shells import moved_proxy
+from mirrorbake.projection import MAP_PROJECTIONS
 from mirrorbake.proxy import proxy_from_attributes, proxy_to_attributes
 from mirrorbake.scene.parameters import Axis, ParameterSpace
 from mirrorbake.scene.pose import Pose, rotation_matrix
@@ -64,7 +65,7 @@ class Case:
     """Of a third shell of the ring, behind the local one. The ball then reads the ring's distant map."""
     fade_degrees: float | None = None
     """There is a static set, to which the PEM fades."""
-    projection: Projection = "cube"
+    projection: str = "cube"
     run_time: _core.RunTimeModel = field(default_factory=lambda: _core.run_time_model("Web"))
     segments: int = 40
     """Around the ring; 320 make triangles smaller than a pixel."""
@@ -213,7 +214,7 @@ def _turned(tangents: FloatArray, pose: Pose) -> FloatArray:
     return np.concatenate([turned.astype(np.float32), tangents[:, 3:]], axis=1)
 
 
-def _maps(seed: int, channels: int, size: int, projection: Projection = "cube") -> FloatArray:
+def _maps(seed: int, channels: int, size: int, projection: str = "cube") -> FloatArray:
     """A pyramid of smooth colours with some noise on every level of its own: wrong levels are seen."""
     random = np.random.default_rng(seed)
     levels = []
@@ -221,7 +222,7 @@ def _maps(seed: int, channels: int, size: int, projection: Projection = "cube") 
     for level in range(size.bit_length()):
         n = size >> level
         centres = (np.arange(n) + 0.5) / n
-        faces = np.arange(FACES[projection])
+        faces = np.arange(MAP_PROJECTIONS[projection].faces)
         f, t, s = np.meshgrid(faces, centres, centres, indexing="ij")
         for_all = [
             0.5
@@ -334,7 +335,7 @@ def _eye(t: float, raised: float) -> tuple[float, float, float]:
 class CasePem:
     """The maps of a case as the page gets them: rounded to codes."""
 
-    def __init__(self, projection: Projection = "cube", size: int = 32) -> None:
+    def __init__(self, projection: str = "cube", size: int = 32) -> None:
         self.projection = projection
         self.size = size
         self.code = RadianceCode.for_range(2.0, 3.6)

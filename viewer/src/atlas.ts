@@ -5,7 +5,7 @@
 /// neighbouring faces, so that bilinear reads are seamless by our own rule and not by that of a driver; on a paraboloid, whose
 /// texels go on beyond the rim, the last one again.
 
-import type { Projection } from "./manifest";
+import { PROJECTIONS, type Projection } from "./projection";
 
 export interface RadianceCode {
   low: number;
@@ -46,28 +46,19 @@ export function levelCount(size: number): number {
   return Math.log2(size) + 1;
 }
 
-export function faceCount(projection: Projection): number {
-  return projection === "cube" ? 6 : 2;
-}
-
-/// Faces of a level in a row of the received atlas, and rows of them.
-function facesOf(projection: Projection): { across: number; down: number } {
-  return projection === "cube" ? { across: 3, down: 2 } : { across: 2, down: 1 };
-}
-
 /// Pixels of the received atlas.
 export function atlasSize(size: number, projection: Projection): { width: number; height: number } {
-  const { across, down } = facesOf(projection);
-  return { width: across * size, height: down * (size + (size >> 1)) };
+  const { faces, across } = PROJECTIONS[projection];
+  return { width: across * size, height: (faces / across) * (size + (size >> 1)) };
 }
 
 /// Top left texel of a level in the received atlas.
 export function sourcePlace(size: number, level: number, projection: Projection): { x: number; y: number } {
   if (level === 0) return { x: 0, y: 0 };
-  const { across, down } = facesOf(projection);
+  const { faces, across } = PROJECTIONS[projection];
   let x = 0;
   for (let finer = 1; finer < level; ++finer) x += across * (size >> finer);
-  return { x, y: down * size };
+  return { x, y: (faces / across) * size };
 }
 
 /// Size of a layer on the GPU.
@@ -86,58 +77,6 @@ export function layerPlace(size: number, level: number): { x: number; y: number 
   return { x: size + 2, y: size - 2 * (size >> level) + 2 * (level - 1) };
 }
 
-type Vector = [number, number, number];
-
-// OpenGL 4.6 core profile, table 8.19: the axis of each face, and those along which s and t grow.
-const FACES: [Vector, Vector, Vector][] = [
-  [
-    [1, 0, 0],
-    [0, 0, -1],
-    [0, -1, 0],
-  ],
-  [
-    [-1, 0, 0],
-    [0, 0, 1],
-    [0, -1, 0],
-  ],
-  [
-    [0, 1, 0],
-    [1, 0, 0],
-    [0, 0, 1],
-  ],
-  [
-    [0, -1, 0],
-    [1, 0, 0],
-    [0, 0, -1],
-  ],
-  [
-    [0, 0, 1],
-    [1, 0, 0],
-    [0, -1, 0],
-  ],
-  [
-    [0, 0, -1],
-    [-1, 0, 0],
-    [0, -1, 0],
-  ],
-];
-
-/// The texel of a neighbouring face that lies across the edge from a place one outside of a face: its number
-/// (face · n + row) · n + column.
-export function texelAcrossEdge(n: number, face: number, row: number, column: number): number {
-  const [major, sAxis, tAxis] = FACES[face];
-  const s = (2 * (column + 0.5)) / n - 1;
-  const t = (2 * (row + 0.5)) / n - 1;
-  const d = major.map((m, i) => m + s * sAxis[i] + t * tAxis[i]) as Vector;
-  const a = d.map(Math.abs);
-  const axis = a[0] >= a[1] && a[0] >= a[2] ? 0 : a[1] >= a[2] ? 1 : 2;
-  const other = 2 * axis + (d[axis] < 0 ? 1 : 0);
-  const along = (direction: Vector) =>
-    (direction[0] * d[0] + direction[1] * d[1] + direction[2] * d[2]) / a[axis];
-  const texel = (x: number) => Math.min(Math.max(Math.floor((0.5 + 0.5 * x) * n), 0), n - 1);
-  return (other * n + texel(along(FACES[other][2]))) * n + texel(along(FACES[other][1]));
-}
-
 /// How a layer of a map of `size` is put together: where each texel of it comes from in the received atlas. `source` has the
 /// place of every texel of all layers; `corners` names those that are the mean of three, as [to, a, b, c].
 export interface Assembly {
@@ -154,8 +93,7 @@ export function assemblyOf(size: number, projection: Projection): Assembly {
   const known = assemblies.get(key);
   if (known) return known;
   const { width, height } = layerSize(size);
-  const faces = faceCount(projection);
-  const { across } = facesOf(projection);
+  const { faces, across, acrossEdge } = PROJECTIONS[projection];
   const source = new Int32Array(faces * width * height).fill(-1);
   const corners: number[] = [];
   const columns = across * size;
@@ -177,13 +115,12 @@ export function assemblyOf(size: number, projection: Projection): Assembly {
           const outside = Number(row < 0 || row >= n) + Number(column < 0 || column >= n);
           const r = Math.min(Math.max(row, 0), n - 1);
           const c = Math.min(Math.max(column, 0), n - 1);
-          if (projection === "paraboloid") {
+          if (!acrossEdge) {
             source[at(row, column)] = inAtlas((face * n + r) * n + c);
           } else if (outside === 2) {
             corners.push(at(row, column), at(r, c), at(row, c), at(r, column));
           } else {
-            const texel =
-              outside === 1 ? texelAcrossEdge(n, face, row, column) : (face * n + row) * n + column;
+            const texel = outside === 1 ? acrossEdge(n, face, row, column) : (face * n + row) * n + column;
             source[at(row, column)] = inAtlas(texel);
           }
         }

@@ -2,8 +2,9 @@
 
 import { atlasSize } from "./atlas";
 import { UserError } from "./errors";
-import type { MapEntry, Projection } from "./manifest";
+import type { MapEntry } from "./manifest";
 import { inflate } from "./mesh";
+import type { Projection } from "./projection";
 
 /// Pixels along a side.
 const BLOCK = 4;

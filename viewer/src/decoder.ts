@@ -3,7 +3,7 @@
 import type { RadianceCode } from "./atlas";
 import DecodeWorker from "./decode.worker?worker&inline";
 import { UserError } from "./errors";
-import type { Projection } from "./manifest";
+import type { Projection } from "./projection";
 
 export type DecodeRequest = { bytes: ArrayBuffer; type: string } & (
   | { kind: "probe" }

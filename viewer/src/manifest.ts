@@ -3,11 +3,10 @@
 import type { RadianceCode } from "./atlas";
 import { UserError } from "./errors";
 import { isVector } from "./math";
+import { PROJECTIONS, type Projection } from "./projection";
 import { isProxy, type ProxyShape } from "./proxy";
 
 export type Vec3 = [number, number, number];
-
-export type Projection = "cube" | "paraboloid";
 
 /// A map that there is once for every sample, whichever shells read it.
 export interface MapEntry {
@@ -255,7 +254,7 @@ const MOST_PARTS = 65535;
 const MOST_SHELLS = 64;
 
 function checkMaps(data: Manifest): void {
-  if (data.projection !== "cube" && data.projection !== "paraboloid")
+  if (!Object.hasOwn(PROJECTIONS, data.projection))
     damaged(`this page knows no maps of the projection ${data.projection}`);
   if (!Array.isArray(data.maps) || data.maps.length < 1) damaged("it has no maps");
   for (const map of data.maps) {

@@ -5,12 +5,11 @@
 #include <string>
 #include <utility>
 
-#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
+#include "map_kinds.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/texel_lookup.hpp"
-#include "mirrorbake/projection/cube.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -18,46 +17,8 @@ namespace {
 // Up to this elongation a footprint is round enough for one tap.
 constexpr float kRound = 1.25F;
 
-// A point of a face, (0, 0) its top left corner, (1, 1) its bottom right one.
-struct FacePoint {
-  int face;
-  float s, t;
-};
-
 FacePoint face_point(TopologyKind kind, glm::vec3 d) {
-  switch (kind) {
-    case TopologyKind::cube: {
-      const CubeCoordinates c = cube_from_direction(d);
-      return {c.face, c.s, c.t};
-    }
-    case TopologyKind::dual_paraboloid: {
-      const glm::dvec3 e(d);
-      const double size = glm::length(e) + std::abs(e.z);
-      return {d.z >= 0.0F ? 0 : 1, static_cast<float>(0.5 + 0.5 * e.x / size),
-              static_cast<float>(0.5 - 0.5 * e.y / size)};
-    }
-    case TopologyKind::atlas: break;
-  }
-  return {0, d.x, d.y};
-}
-
-// Squared lengths on the face, whose sides have length 1, of changes of the direction.
-float cube_length2(glm::vec3 d, int axis, glm::vec3 change) {
-  // Derivative of the face coordinates ½ + ½ d/|major|, by the quotient rule.
-  const float major = std::abs(d[axis]);
-  const float sign = d[axis] < 0.0F ? -1.0F : 1.0F;
-  glm::vec3 on_face = (change - d / major * (sign * change[axis])) / major;
-  on_face[axis] = 0.0F;
-  return 0.25F * glm::dot(on_face, on_face);
-}
-
-float paraboloid_length2(glm::vec3 d, glm::vec3 change) {
-  // The same of ½ + ½ (x, y) / (|d| + |z|).
-  const float length = glm::length(d);
-  const float size = length + std::abs(d.z);
-  const float growth = glm::dot(d, change) / length + (d.z < 0.0F ? -change.z : change.z);
-  const glm::vec2 on_face = (glm::vec2(change) - glm::vec2(d) * (growth / size)) / size;
-  return 0.25F * glm::dot(on_face, on_face);
+  return for_kind(kind, [&]<typename Maps>(Maps) { return Maps::point(d); });
 }
 
 void add_nearest(const TexelTopology& topology, glm::vec3 direction, TexelReads& reads) {
@@ -107,23 +68,11 @@ TapPattern tap_pattern(float major, float minor, int max_taps, int levels) {
 }
 
 TexelLengths texel_lengths(const TexelTopology& topology, const Footprint& footprint) {
+  const glm::vec2 sides(topology.width(0), topology.height(0));
   const glm::vec3 d = footprint.direction;
-  const float side = static_cast<float>(topology.width(0));
-  switch (topology.kind()) {
-    case TopologyKind::cube: {
-      const glm::vec3 a = glm::abs(d);
-      int axis = a.y > a.x ? 1 : 0;
-      if (a.z > a[axis]) axis = 2;
-      return {side * std::sqrt(cube_length2(d, axis, footprint.ddx)),
-              side * std::sqrt(cube_length2(d, axis, footprint.ddy))};
-    }
-    case TopologyKind::dual_paraboloid:
-      return {side * std::sqrt(paraboloid_length2(d, footprint.ddx)),
-              side * std::sqrt(paraboloid_length2(d, footprint.ddy))};
-    case TopologyKind::atlas: break;
-  }
-  const glm::vec2 sides(side, static_cast<float>(topology.height(0)));
-  return {glm::length(glm::vec2(footprint.ddx) * sides), glm::length(glm::vec2(footprint.ddy) * sides)};
+  return for_kind(topology.kind(), [&]<typename Maps>(Maps) {
+    return TexelLengths{Maps::length(d, footprint.ddx, sides), Maps::length(d, footprint.ddy, sides)};
+  });
 }
 
 void add_bilinear(const TexelTopology& topology, int level, glm::vec3 direction, float scale,
@@ -143,11 +92,11 @@ void add_bilinear(const TexelTopology& topology, int level, glm::vec3 direction,
     reads.add(below + 1, scale * weights[3]);
     return;
   }
-  const bool cube = topology.kind() == TopologyKind::cube;
-  add_face_bilinear(cell, width, height, cube, scale, [&](int row, int column, float weight) {
-    reads.add(cube ? topology.texel_at({level, p.face, row, column})
-                   : topology.index(
-                         {level, p.face, std::clamp(row, 0, height - 1), std::clamp(column, 0, width - 1)}),
+  const bool seamless = topology.beyond_edges() == BeyondEdges::neighbour;
+  add_face_bilinear(cell, width, height, seamless, scale, [&](int row, int column, float weight) {
+    reads.add(seamless ? topology.texel_at({level, p.face, row, column})
+                       : topology.index({level, p.face, std::clamp(row, 0, height - 1),
+                                         std::clamp(column, 0, width - 1)}),
               weight);
   });
 }

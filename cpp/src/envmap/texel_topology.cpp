@@ -4,9 +4,9 @@
 #include <bit>
 #include <string>
 
+#include "map_kinds.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/envmap/texel_lookup.hpp"
-#include "mirrorbake/projection/projection.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -17,9 +17,11 @@ void check_side(const char* name, int side) {
   }
 }
 
-Projection projection_of(TopologyKind kind) {
-  return {.kind = kind == TopologyKind::cube ? ProjectionKind::cube : ProjectionKind::dual_paraboloid};
+const MapProjection& traits(TopologyKind kind) {
+  return *std::ranges::find(kMapProjections, kind, &MapProjection::kind);
 }
+
+Projection projection_of(TopologyKind kind) { return {.kind = traits(kind).projection}; }
 
 }  // namespace
 
@@ -34,20 +36,27 @@ TexelTopology::TexelTopology(TopologyKind kind, int faces, int width, int height
   }
 }
 
-TexelTopology TexelTopology::cube(int size) {
+std::span<const MapProjection> map_projections() { return kMapProjections; }
+
+TexelTopology TexelTopology::of(const MapProjection& projection, int size) {
   check_side("size", size);
-  return {TopologyKind::cube, 6, size, size};
+  return {projection.kind, projection.faces, size, size};
 }
 
+TexelTopology TexelTopology::cube(int size) { return of(traits(TopologyKind::cube), size); }
+
 TexelTopology TexelTopology::dual_paraboloid(int size) {
-  check_side("size", size);
-  return {TopologyKind::dual_paraboloid, 2, size, size};
+  return of(traits(TopologyKind::dual_paraboloid), size);
 }
 
 TexelTopology TexelTopology::atlas(int width, int height) {
   check_side("width", width);
   check_side("height", height);
   return {TopologyKind::atlas, 1, width, height};
+}
+
+BeyondEdges TexelTopology::beyond_edges() const {
+  return kind_ == TopologyKind::atlas ? BeyondEdges::nothing : traits(kind_).beyond_edges;
 }
 
 TexelPlace TexelTopology::place(std::uint32_t texel) const {
@@ -80,7 +89,7 @@ std::array<std::uint32_t, 4> TexelTopology::neighbours(std::uint32_t texel) cons
   for (std::size_t i = 0; i < 4; ++i) {
     const TexelPlace& q = around[i];
     const bool inside = q.row >= 0 && q.column >= 0 && q.row < height(p.level) && q.column < width(p.level);
-    result[i] = inside || kind_ == TopologyKind::cube ? texel_at(q) : kNoTexel;
+    result[i] = inside || beyond_edges() == BeyondEdges::neighbour ? texel_at(q) : kNoTexel;
   }
   return result;
 }

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.pem.pyramid import FACES, capture, pyramid_of
+from mirrorbake.pem.pyramid import capture, pyramid_of
+from mirrorbake.projection import MAP_PROJECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
-    from mirrorbake.pem.pyramid import Projection
     from mirrorbake.scene.stage import Stage
 
 SUBTEXELS = 4
@@ -22,7 +22,7 @@ SUBTEXELS = 4
 
 
 def captured_shells(
-    stage: Stage, origin: Sequence[float], projection: Projection, size: int
+    stage: Stage, origin: Sequence[float], projection: str, size: int
 ) -> list[FloatArray | None]:
     """Capture what each shell holds but for the object, which is left out, with what is behind it.
 
@@ -67,7 +67,7 @@ def captured_shells(
 def _covered(
     stage: Stage,
     origin: Sequence[float],
-    projection: Projection,
+    projection: str,
     size: int,
     rule: _core.ShellRule,
     hidden: list[int],
@@ -77,10 +77,10 @@ def _covered(
     across, up = np.meshgrid(places, -places)
     points = np.ascontiguousarray(np.stack([across.ravel(), up.ravel()], axis=-1))
     shares = []
-    for face in range(FACES[projection]):
+    kept = MAP_PROJECTIONS[projection]
+    for face in range(kept.faces):
         faces = np.full(len(points), face, np.int32)
-        name = "dual_paraboloid" if projection == "paraboloid" else projection
-        directions = _core.directions_from_points(name, faces, points)
+        directions = _core.directions_from_points(kept.projection, faces, points)
         origins = np.broadcast_to(np.asarray(origin, np.float32), directions.shape)
         distance, met = stage.tracer.intersect_distance(np.ascontiguousarray(origins), directions, hidden)
         grid = rule.holds(met, distance, stage.built.reflector).reshape(size, SUBTEXELS, size, SUBTEXELS)

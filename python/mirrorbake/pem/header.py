@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.pem.pyramid import FACES, Projection, coarser_sizes, topology_of
+from mirrorbake.pem.pyramid import coarser_sizes, topology_of
 from mirrorbake.pem.schema import FORMAT_VERSION, checksum_of
 from mirrorbake.pem.shells import MapEntry, Part, Shell, maps_of
+from mirrorbake.projection import MAP_PROJECTIONS
 from mirrorbake.scene.config_shells import ShellRule
 from mirrorbake.scene.parameters import ParameterSpace
 from mirrorbake.scene.plan import Plan
@@ -26,12 +27,6 @@ if TYPE_CHECKING:
 
 RECORD = ("trace_s", "build_s", "solve_s", "clamped_maps", "clamped_reference")
 MAP_RECORD = ("iterations", "gradient", "converged")
-
-_FACES: Mapping[str, str] = {
-    "cube": "+X -X +Y -Y +Z -Z, OpenGL orientation, row 0 on top",
-    "paraboloid": "front (+Z), back (-Z), row 0 on top",
-}
-"""What the attributes say of a map's faces, by its projection."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +103,7 @@ class Header:
     static: dict[str, Any]
     """Proxies of the captured map: `infinite`, and `proxy`: the distant layer's, None if that is infinite.
     `fade`: `degrees` beyond the samples at which half of the static set shows; None: there is no such set."""
-    projection: Projection
+    projection: str
     """Of all maps."""
     map_size: int
     """Texels along a side of a face of the finest level of the largest map."""
@@ -136,7 +131,7 @@ class Header:
             "conventions": {
                 "world": "right-handed, +Y up, metres; positions are relative to `origin`",
                 "radiance": "scene-linear, Rec.709 primaries",
-                "faces": _FACES[self.projection],
+                "faces": MAP_PROJECTIONS[self.projection].order,
                 "texels": "finest level (face, row, column), then residuals of the coarser levels, then 0",
                 "residuals": "level l = mean of 2x2 blocks of level l-1, from the finest down, plus residual",
                 "level_sizes": [self.map_size, *coarser_sizes(self.map_size)],
@@ -191,8 +186,8 @@ class Header:
 
     @property
     def faces(self) -> int:
-        """Of a map: 6 of a cube, 2 of a dual paraboloid."""
-        return FACES[self.projection]
+        """Of a map."""
+        return MAP_PROJECTIONS[self.projection].faces
 
     @property
     def topology(self) -> _core.TexelTopology:

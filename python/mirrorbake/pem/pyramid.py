@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.envmap import EnvMap
+from mirrorbake.projection import MAP_PROJECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,39 +21,30 @@ if TYPE_CHECKING:
 LARGEST_HALF = 65504.0
 
 
-FACES = {"cube": 6, "paraboloid": 2}
-"""By the projection of maps."""
-
-Projection = Literal["cube", "paraboloid"]
-
-
-def topology_of(projection: Projection, size: int) -> _core.TexelTopology:
-    """Return how the texels of a map lie to each other."""
-    if projection == "cube":
-        return _core.TexelTopology.cube(size)
-    return _core.TexelTopology.dual_paraboloid(size)
+def topology_of(projection: str, size: int) -> _core.TexelTopology:
+    """Return how the texels of a map lie to each other, by its projection's name in scene files."""
+    return _core.TexelTopology.of(MAP_PROJECTIONS[projection], size)
 
 
-def pyramid_of(finest: FloatArray, projection: Projection) -> FloatArray:
+def pyramid_of(finest: FloatArray, projection: str) -> FloatArray:
     """Return all levels (texels, C) of a finest level (F, S, S, C), weighted by solid angles."""
     if projection == "cube":
         return np.asarray(_core.build_cube_pyramid(finest))
-    mips = EnvMap.from_array(finest, "dual_paraboloid").mips()
+    mips = EnvMap.from_array(finest, MAP_PROJECTIONS[projection].projection).mips()
     return np.ascontiguousarray(mips.values.reshape(-1, finest.shape[-1]))
 
 
 def capture(
     tracer: _core.Tracer,
     origin: Sequence[float],
-    projection: Projection,
+    projection: str,
     size: int,
     hidden: Sequence[int],
     options: _core.TraceOptions,
 ) -> FloatArray:
     """Return the radiance (F, S, S, 3) that arrives at a point, some objects removed."""
-    if projection == "cube":
-        return np.asarray(tracer.capture_cube(origin, size, hidden, options))
-    return np.asarray(tracer.capture(origin, "dual_paraboloid", size, size, hidden, options))
+    kept = MAP_PROJECTIONS[projection].projection
+    return np.asarray(tracer.capture(origin, kept, size, size, hidden, options))
 
 
 def decimate(level: FloatArray) -> FloatArray:
@@ -112,7 +104,7 @@ def split_pyramid(
         'float16' or 'float32'. Residuals refer to the finest level as it is stored, so they also take up its
         rounding.
     faces
-        Of the projection (`FACES`).
+        Of the projection (`MAP_PROJECTIONS`).
 
     Returns
     -------

@@ -12,9 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from mirrorbake import _core
 from mirrorbake.errors import StoreError
+from mirrorbake.projection import MAP_PROJECTIONS
 from mirrorbake.proxy import SHAPES, proxy_from_attributes
 from mirrorbake.scene.config_shells import ShellRule
-from mirrorbake.scene.config_values import MAX_IMAGE_SIDE, MAX_MAP_SIZE
+from mirrorbake.scene.config_values import MAX_IMAGE_SIDE, MAX_MAP_SIZE, one_of
 
 FORMAT_VERSION = 6
 MAX_SAMPLES = 100_000_000
@@ -130,7 +131,7 @@ class Attributes(_Model):
     library: Annotated[str, Field(max_length=100)]
     fingerprint: Sha256
     conventions: dict[str, Any]
-    projection: Literal["cube", "paraboloid"]
+    projection: Annotated[str, one_of(*MAP_PROJECTIONS)]
     map_size: Annotated[int, Field(ge=1, le=MAX_MAP_SIZE)]
     precision: Literal["float16", "float32"]
     image_size: Annotated[

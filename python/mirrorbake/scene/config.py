@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from mirrorbake import _core
+from mirrorbake.projection import MAP_PROJECTIONS
 from mirrorbake.proxy import FAMILIES
 from mirrorbake.scene.config_axes import SCENE_AXES, Light, Motion, scene_axes
 from mirrorbake.scene.config_infer import Infer
@@ -216,7 +217,6 @@ class Layers(Section):
 
 
 DistantShape: TypeAlias = Annotated[str, one_of(*FAMILIES)]
-"""What `choose_proxy` fits."""
 
 
 class Maps(Section):
@@ -224,8 +224,8 @@ class Maps(Section):
 
     size: Annotated[MapSize | None, *AUTO] = None
     """Texels along a side of a face, a power of two. "auto": what the views can tell apart."""
-    projection: Literal["cube", "paraboloid"] = "cube"
-    """Six faces, or two dual paraboloids of a third of the texels, which some exports do not take."""
+    projection: Annotated[str, one_of(*MAP_PROJECTIONS)] = "cube"
+    """Six faces, or two dual paraboloids of a third of the texels."""
     distant: Annotated[DistantShape | None, *AUTO] = None
     """Geometry of the distant layer. "auto": the simplest shape that predicts where reflected rays end."""
     box: Literal["angle", "robust", "mean_distance"] = "angle"

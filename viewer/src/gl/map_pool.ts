@@ -1,6 +1,7 @@
-import { faceCount, layerSize } from "../atlas";
+import { layerSize } from "../atlas";
 import { UserError } from "../errors";
 import { litSides, type Manifest } from "../manifest";
+import { PROJECTIONS } from "../projection";
 import type { Counters } from "./program";
 import { IRRADIANCE_ROW } from "./shaders";
 
@@ -10,7 +11,7 @@ export const IRRADIANCE_UNIT = 2;
 export function sampleBytes(manifest: Manifest): number {
   const { width, height } = layerSize(largestSize(manifest));
   const { maps, alphas } = mapCounts(manifest);
-  const texels = faceCount(manifest.projection) * width * height;
+  const texels = PROJECTIONS[manifest.projection].faces * width * height;
   return texels * (4 * maps + alphas) + 6 * litSides(manifest) * irradianceTexels(manifest);
 }
 
@@ -65,7 +66,7 @@ export class MapPool {
     this.alphas = alphas;
     const layers = gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number;
     const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
-    const faces = faceCount(manifest.projection);
+    const faces = PROJECTIONS[manifest.projection].faces;
     const sets = manifest.static.maps === null ? 0 : 1;
     const room = Math.floor((layers / faces - 1) / maps) - sets;
     if (room < least || Math.max(width, height) > side) {

@@ -1,7 +1,7 @@
 /// The drawing itself. Every level and every tap of a lookup is placed here, by the formula of the run-time model
 /// (mirrorbake/envmap/reads.hpp, mirrorbake/surface/lookup.hpp): drivers' own levels and anisotropy differ between cards.
 
-import type { Projection } from "../manifest";
+import { PROJECTIONS, type Projection } from "../projection";
 import { EXITS } from "../proxy";
 
 export const HEADER = `#version 300 es
@@ -10,11 +10,6 @@ precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
 `;
-
-/// The header of a program that reads maps: functions below have a body for each projection.
-function mapHeader(projection: Projection): string {
-  return `${HEADER}${projection === "paraboloid" ? "#define PARABOLOID\n" : ""}`;
-}
 
 /// Vertices of a row of the texture that holds irradiance.
 export const IRRADIANCE_ROW = 1024;
@@ -84,8 +79,8 @@ void main() {
 `;
 }
 
-/// Reads of a map: needs the samplers uRadiance and uAlpha, and uLayer: 1 / size of a layer in texels.
-export const READS = `
+/// What reads of a map need: the samplers uRadiance and uAlpha, and uLayer: 1 / size of a layer in texels.
+const MAPS = `
 uniform sampler2DArray uRadiance;
 uniform sampler2DArray uAlpha;
 uniform vec2 uLayer;
@@ -95,57 +90,9 @@ struct FacePoint {
   float face;
   vec2 st;
 };
+`;
 
-#ifdef PARABOLOID
-// The front map, around +Z, is face 0, the back map face 1.
-FacePoint facePoint(vec3 d) {
-  float size = max(length(d) + abs(d.z), 1e-30);
-  return FacePoint(d.z >= 0.0 ? 0.0 : 1.0, 0.5 + 0.5 * vec2(d.x, -d.y) / size);
-}
-
-// Length of the derivative of (x, y) / (|d| + |z|), in faces.
-float faceLength(vec3 d, vec3 change) {
-  float range = max(length(d), 1e-30);
-  float size = range + abs(d.z);
-  float growth = dot(d, change) / range + (d.z < 0.0 ? -change.z : change.z);
-  return 0.5 * length(change.xy - d.xy * (growth / size)) / size;
-}
-#else
-FacePoint facePoint(vec3 d) {
-  vec3 a = abs(d);
-  if (a.x >= a.y && a.x >= a.z) {
-    vec2 st = vec2(d.x > 0.0 ? -d.z : d.z, -d.y) / max(a.x, 1e-30);
-    return FacePoint(d.x < 0.0 ? 1.0 : 0.0, 0.5 + 0.5 * st);
-  }
-  if (a.y >= a.z) {
-    vec2 st = vec2(d.x, d.y > 0.0 ? d.z : -d.z) / a.y;
-    return FacePoint(d.y < 0.0 ? 3.0 : 2.0, 0.5 + 0.5 * st);
-  }
-  vec2 st = vec2(d.z > 0.0 ? d.x : -d.x, -d.y) / a.z;
-  return FacePoint(d.z < 0.0 ? 5.0 : 4.0, 0.5 + 0.5 * st);
-}
-
-float faceLength(vec3 d, vec3 change) {
-  vec3 a = abs(d);
-  float major;
-  vec3 onFace;
-  if (a.x >= a.y && a.x >= a.z) {
-    onFace = change - d * (change.x / d.x);
-    major = a.x;
-    onFace.x = 0.0;
-  } else if (a.y >= a.z) {
-    onFace = change - d * (change.y / d.y);
-    major = a.y;
-    onFace.y = 0.0;
-  } else {
-    onFace = change - d * (change.z / d.z);
-    major = a.z;
-    onFace.z = 0.0;
-  }
-  return 0.5 * length(onFace) / max(major, 1e-30);
-}
-#endif
-
+const TAPS = `
 // Where a level lies in a layer (layerPlace in atlas.ts), and a point of the face on it.
 vec2 levelPoint(float size, float level, vec2 st) {
   float n = max(floor(size * exp2(-level) + 0.5), 1.0);
@@ -218,9 +165,13 @@ float readAlpha(vec3 d, float level, float size, float layer) {
 }
 `;
 
+export function reads(projection: Projection): string {
+  return `${MAPS}${PROJECTIONS[projection].glsl}${TAPS}`;
+}
+
 /// `shells` of the part and the number of samples that are `mixed`, the static set among them, are constants of the program.
 export function meshFragment(shells: number, mixed: number, projection: Projection): string {
-  return `${mapHeader(projection)}
+  return `${HEADER}
 #define SHELLS ${shells}
 #define MIXED ${mixed}
 in vec3 vPosition;
@@ -231,7 +182,7 @@ in vec2 vUv;
 in vec3 vColor;
 in vec4 vTangent;
 out vec4 oColour;
-${READS}
+${reads(projection)}
 uniform vec3 uEye;
 uniform vec3 uForward;  // normal of the image plane
 uniform vec3 uMiddle;   // from the eye to the middle of the image on the plane at distance 1
@@ -479,10 +430,10 @@ void main() {
 
 /// Surroundings behind the object.
 export function backgroundFragment(projection: Projection): string {
-  return `${mapHeader(projection)}
+  return `${HEADER}
 in vec2 vUv;
 out vec4 oColour;
-${READS}
+${reads(projection)}
 uniform vec3 uMiddle;
 uniform vec3 uRight;
 uniform vec3 uDown;

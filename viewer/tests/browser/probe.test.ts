@@ -5,7 +5,7 @@ import { join } from "node:path";
 import type { Readable } from "node:stream";
 import { expect, test } from "vitest";
 import { assemblyOf, atlasSize, layerSize, levelCount, sourcePlace } from "../../src/atlas";
-import { HEADER, READS } from "../../src/gl/shaders";
+import { HEADER, reads } from "../../src/gl/shaders";
 import { launch, open, serve } from "./support";
 
 declare global {
@@ -29,7 +29,7 @@ uniform sampler2D uDdx;
 uniform sampler2D uDdy;
 uniform float uSize;
 out vec4 oColour;
-${READS}
+${reads("cube")}
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec3 d = texelFetch(uD, at, 0).xyz;

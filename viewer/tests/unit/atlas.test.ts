@@ -10,9 +10,9 @@ import {
   packSharedExponent,
   radianceTable,
   sourcePlace,
-  texelAcrossEdge,
   unpackSharedExponent,
 } from "../../src/atlas";
+import { texelAcrossEdge } from "../../src/projection";
 
 describe("shared exponents", () => {
   test("are off by a 512th of the largest channel at most", () => {

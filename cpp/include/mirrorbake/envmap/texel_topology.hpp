@@ -3,17 +3,39 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
 #include "mirrorbake/envmap/cube_pyramid.hpp"
+#include "mirrorbake/projection/projection.hpp"
 
 /// How the texels of a map with mip levels lie to each other: all that a solver, a regulariser and a fill
 /// have to know of a map.
 namespace mirrorbake {
 
 enum class TopologyKind { cube, dual_paraboloid, atlas };
+
+/// What a read of a map finds beyond the edges of a face: texels of the neighbouring face, three of which
+/// meet at a corner, or nothing, because the texels of a face go on beyond what it shows; its last ones are
+/// repeated then.
+enum class BeyondEdges { neighbour, nothing };
+
+/// A projection in which the maps of a PEM can be kept: what a solver, files and the page have to know of it.
+struct MapProjection {
+  TopologyKind kind;
+  std::string_view name;  ///< in scene files and PEMs
+  ProjectionKind projection;
+  int faces;
+  int faces_in_a_row;      ///< of a level in the images of the web format
+  std::string_view order;  ///< of the faces, and of their texels, in words
+  BeyondEdges beyond_edges;
+};
+
+/// All of them; `atlas` is none.
+std::span<const MapProjection> map_projections();
 
 inline constexpr std::uint32_t kNoTexel = 0xffffffffU;
 
@@ -27,6 +49,7 @@ struct TexelPlace {
 class TexelTopology {
  public:
   /// Faces of size² texels. Throws InvalidArgument unless the size is a power of two from 1 to 16384.
+  static TexelTopology of(const MapProjection& projection, int size);
   static TexelTopology cube(int size);
   static TexelTopology dual_paraboloid(int size);
   /// One sheet of width × height texels on texture coordinates, (0, 0) its top left corner.
@@ -35,6 +58,7 @@ class TexelTopology {
       : TexelTopology(cube(layout.size)) {}
 
   TopologyKind kind() const { return kind_; }
+  BeyondEdges beyond_edges() const;
   int levels() const { return static_cast<int>(offsets_.size()) - 1; }
   int faces() const { return faces_; }
   int width(int level) const { return width_ >> level > 0 ? width_ >> level : 1; }
@@ -57,8 +81,8 @@ class TexelTopology {
   /// repeated.
   std::uint32_t texel_at(const TexelPlace& place) const;
 
-  /// Above, below, left, right, so that whoever is a texel's neighbour has it as one; kNoTexel beyond the
-  /// edges of an atlas and of the sheets of a dual paraboloid, which go on beyond the rim.
+  /// Above, below, left, right, so that whoever is a texel's neighbour has it as one; kNoTexel where
+  /// nothing lies beyond an edge, as of an atlas and of the sheets of a dual paraboloid.
   std::array<std::uint32_t, 4> neighbours(std::uint32_t texel) const;
   /// kNoTexel on the coarsest level.
   std::uint32_t parent(std::uint32_t texel) const;

@@ -12,13 +12,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
-    from mirrorbake.pem.pyramid import Projection
 
 BLOCK = 4
 """Pixels along a side: of 8, the images are an eighth larger, and the blocks' file takes 2 kB less."""
 
 
-def blocks_of(texels: NDArray[np.bool_], size: int, projection: Projection) -> NDArray[np.bool_]:
+def blocks_of(texels: NDArray[np.bool_], size: int, projection: str) -> NDArray[np.bool_]:
     """Return the blocks of an atlas (`to_atlas`) with one of some texels (T,) in them: (⌈H/4⌉, ⌈W/4⌉)."""
     atlas = to_atlas(texels[:, None].astype(np.uint8), size, projection)[..., 0] > 0
     height, width = atlas.shape

@@ -113,17 +113,17 @@ def turn_cube(level: FloatArray, lookup_from_world: NDArray[np.int64]) -> FloatA
     return turned
 
 
-def cube_from_paraboloid(level_maps: EnvMap, size: int) -> FloatArray:
-    """A level of a cube map as a lookup reads it from the levels of a dual paraboloid.
+def cube_from_levels(level_maps: EnvMap, size: int) -> FloatArray:
+    """A level of a cube map as a lookup reads it from the levels of a map of another projection.
 
     Each texel is the lookup in the direction of its centre with a footprint of one texel: from the two levels
-    of the paraboloid whose texels are next in size to the cube's there. Levels that were inferred stay what
+    of the map whose texels are next in size to the cube's there. Levels that were inferred stay what
     they are for.
 
     Parameters
     ----------
     level_maps
-        All levels of the dual paraboloid.
+        All levels of the map.
     size
         Texels along a side of the cube's level.
 

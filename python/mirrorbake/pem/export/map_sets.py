@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake.errors import OptionError
-from mirrorbake.pem.pyramid import FACES, pyramid_of
+from mirrorbake.pem.pyramid import pyramid_of
 from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.shells import moved_proxy
+from mirrorbake.projection import MAP_PROJECTIONS
 from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.load import parse_config
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from mirrorbake import _core
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
-    from mirrorbake.pem.pyramid import Projection
     from mirrorbake.pem.shells import Shell
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.parameters import ParameterSpace, Point
@@ -37,7 +37,7 @@ class ShellMap:
     """Texels along a side of a face of the finest level."""
     pyramid: FloatArray
     """(texels, C), float32: all levels, the finest first; opaque RGB, or premultiplied RGBA."""
-    projection: Projection = "cube"
+    projection: str = "cube"
     off_hull: bool = False
     """Triangles on the reflector's convex hull do not read it."""
 
@@ -53,7 +53,7 @@ class ShellMap:
 
     def level(self, index: int) -> FloatArray:
         """Level of shape (F, s, s, C), s = size >> index; F faces of the projection."""
-        faces = FACES[self.projection]
+        faces = MAP_PROJECTIONS[self.projection].faces
         start = sum(faces * (self.size >> i) ** 2 for i in range(index))
         side = self.size >> index
         return self.pyramid[start : start + faces * side * side].reshape(faces, side, side, self.channels)

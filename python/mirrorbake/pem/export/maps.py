@@ -15,11 +15,12 @@ from mirrorbake.files import write_text
 from mirrorbake.pem.export.frames import (
     FRAMES,
     Frame,
-    cube_from_paraboloid,
+    cube_from_levels,
     move_proxy,
     source_from_panorama,
     turn_cube,
 )
+from mirrorbake.projection import MAP_PROJECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -123,7 +124,7 @@ def export_maps(
 
 def _notes(resampled: bool, clamped: int) -> Iterator[str]:
     if resampled:
-        yield "the maps are dual paraboloids: they were resampled, every level by itself"
+        yield "the maps are no cubes: they were resampled, every level by itself"
     if clamped:
         yield (
             f"{clamped} values beyond ±65504 were clamped to what half floats hold; use float32 to keep them"
@@ -192,14 +193,15 @@ def _describe(shell: ShellMap, frame: Frame, files: list[str], format: str) -> d
 
 
 def _cube_levels(shell: ShellMap) -> list[FloatArray]:
-    """All levels (6, s, s, C) as cube maps; a dual paraboloid gives a cube with as many texels a side."""
+    """All levels (6, s, s, C) as cube maps; others give a cube with as many texels a side of a face."""
     if shell.projection == "cube":
         return [shell.level(i) for i in range(shell.levels)]
     size = shell.size
-    layout = _core.EnvMapLayout("dual_paraboloid", size, size, shell.levels, shell.channels)
+    kept = MAP_PROJECTIONS[shell.projection].projection
+    layout = _core.EnvMapLayout(kept, size, size, shell.levels, shell.channels)
     channels = ["R", "G", "B", "A"][: shell.channels]
     maps = EnvMap(layout, np.ascontiguousarray(shell.pyramid).reshape(-1), channels)
-    return [cube_from_paraboloid(maps, size >> i) for i in range(shell.levels)]
+    return [cube_from_levels(maps, size >> i) for i in range(shell.levels)]
 
 
 def _write_shell(
@@ -212,8 +214,7 @@ def _write_shell(
         return envmap.save(folder / name, faces=faces, format=cast("PixelFormat", precision)).clamped_to_half
 
     if format == "exr" and frame.panorama is not None:
-        projection = "cube" if shell.projection == "cube" else "dual_paraboloid"
-        finest = EnvMap.from_array(shell.level(0), projection, channels)
+        finest = EnvMap.from_array(shell.level(0), MAP_PROJECTIONS[shell.projection].projection, channels)
         panorama = finest.resample("latlong", 2 * shell.size, source_from_target=source_from_panorama(frame))
         return [f"{stem}.exr"], save(panorama, f"{stem}.exr")
     levels = [turn_cube(level, frame.lookup_matrix) for level in _cube_levels(shell)]

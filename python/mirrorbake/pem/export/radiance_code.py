@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mirrorbake.pem.pyramid import FACES
+from mirrorbake.projection import MAP_PROJECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
-    from mirrorbake.pem.pyramid import Projection
 
 STOPS_BELOW_BRIGHT = 7
 """Radiance below which the code is linear, in powers of two below what 99 % of the texels stay below.
@@ -66,11 +65,13 @@ class RadianceCode:
         return radiance
 
 
-FACES_IN_A_ROW = {"cube": 3, "paraboloid": 2}
-"""Of a level in an atlas, by the projection of the maps."""
+def _rows_and_columns(projection: str) -> tuple[int, int]:
+    """How the faces of a level lie in an atlas."""
+    kept = MAP_PROJECTIONS[projection]
+    return kept.faces // kept.faces_in_a_row, kept.faces_in_a_row
 
 
-def atlas_shape(size: int, projection: Projection = "cube") -> tuple[int, int]:
+def atlas_shape(size: int, projection: str = "cube") -> tuple[int, int]:
     """Rows and columns of the atlas of all levels of a map with `size`² texels a face.
 
     >>> atlas_shape(256), atlas_shape(256, "paraboloid")
@@ -78,12 +79,11 @@ def atlas_shape(size: int, projection: Projection = "cube") -> tuple[int, int]:
     >>> atlas_shape(1), atlas_shape(1, "paraboloid")
     ((2, 3), (1, 2))
     """
-    across = FACES_IN_A_ROW[projection]
-    down = FACES[projection] // across
+    down, across = _rows_and_columns(projection)
     return (down * (size + size // 2), across * size)
 
 
-def level_place(size: int, level: int, projection: Projection = "cube") -> tuple[int, int]:
+def level_place(size: int, level: int, projection: str = "cube") -> tuple[int, int]:
     """Row and column of the top left texel of a level in the atlas.
 
     The finest level is on top; the others stand side by side below it, each half as wide as the one to its
@@ -96,22 +96,21 @@ def level_place(size: int, level: int, projection: Projection = "cube") -> tuple
     """
     if level == 0:
         return 0, 0
-    across = FACES_IN_A_ROW[projection]
-    down = FACES[projection] // across
+    down, across = _rows_and_columns(projection)
     return down * size, sum(across * (size >> finer) for finer in range(1, level))
 
 
-def _face_places(size: int, projection: Projection) -> Iterator[tuple[int, int, int]]:
+def _face_places(size: int, projection: str) -> Iterator[tuple[int, int, int]]:
     """Yield side, row and column of every face of every level, as a pyramid has them."""
-    across = FACES_IN_A_ROW[projection]
+    down, across = _rows_and_columns(projection)
     for level in range(size.bit_length()):
         s = size >> level
         row, column = level_place(size, level, projection)
-        for face in range(FACES[projection]):
+        for face in range(down * across):
             yield s, row + (face // across) * s, column + (face % across) * s
 
 
-def to_atlas(pyramid: NDArray[np.uint8], size: int, projection: Projection = "cube") -> NDArray[np.uint8]:
+def to_atlas(pyramid: NDArray[np.uint8], size: int, projection: str = "cube") -> NDArray[np.uint8]:
     """Put a pyramid into its atlas.
 
     Parameters
@@ -139,7 +138,7 @@ def to_atlas(pyramid: NDArray[np.uint8], size: int, projection: Projection = "cu
     return atlas
 
 
-def from_atlas(atlas: NDArray[np.uint8], size: int, projection: Projection = "cube") -> NDArray[np.uint8]:
+def from_atlas(atlas: NDArray[np.uint8], size: int, projection: str = "cube") -> NDArray[np.uint8]:
     """Inverse of `to_atlas`."""
     faces = [
         atlas[top : top + s, left : left + s].reshape(s * s, -1)

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.opened import OpenedPem
-    from mirrorbake.pem.pyramid import Projection
     from mirrorbake.scene.parameters import ParameterSpace
 
 
@@ -69,7 +68,7 @@ class ExportSource:
     motion: dict[str, Any] | None
     """How the object moves along the axis `motion`: `to` (metres) and `turn` (degrees about the vertical in
     `pivot`) at 1; None if it stays."""
-    projection: Projection
+    projection: str
     """Of all maps."""
     maps: tuple[MapEntry, ...]
     pyramid: Callable[[int, int], FloatArray]

@@ -18,7 +18,7 @@ from mirrorbake.pem.export.blocks import blocks_of, filled, pixels_of
 from mirrorbake.pem.export.images import ImageFormat, linear_codes, probe_image, srgb_codes
 from mirrorbake.pem.export.mesh_file import write_irradiance, write_mesh
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
-from mirrorbake.pem.pyramid import FACES
+from mirrorbake.projection import MAP_PROJECTIONS
 from mirrorbake.tone import srgb_bytes, tone_map
 
 if TYPE_CHECKING:
@@ -336,7 +336,7 @@ def _code_of(source: ExportSource) -> RadianceCode:
     bright, largest = [], float(source.static.max())
     for i in probed:
         for m, entry in enumerate(source.maps):
-            finest = source.pyramid(int(i), m)[: FACES[source.projection] * entry.size**2, :3]
+            finest = source.pyramid(int(i), m)[: MAP_PROJECTIONS[source.projection].faces * entry.size**2, :3]
             bright.append(float(np.percentile(finest[::7], 99.0)))
             largest = max(largest, float(finest.max()))
     for pyramid in source.static_maps or ():

@@ -9,6 +9,7 @@ import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.pem.run_time import lookups_of
+from mirrorbake.projection import MAP_PROJECTIONS
 from mirrorbake.study.trade import maps
 from mirrorbake.study.trade.drawing import FILTERS, Drawing, fresnel_models, label_of
 
@@ -215,7 +216,7 @@ _AXES: tuple[Callable[[SceneConfig], Axis | None], ...] = (
     _levels,
     _prefilter,
     _storage,
-    _of_key("projection", "projection of the maps", "maps.projection", lambda own: ["cube", "paraboloid"]),
+    _of_key("projection", "projection of the maps", "maps.projection", lambda own: list(MAP_PROJECTIONS)),
     _of_key("geometry", "geometry of the distant map", "maps.distant", lambda own: _SHAPES),
     _shells,
     _parts,

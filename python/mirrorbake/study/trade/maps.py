@@ -11,6 +11,7 @@ import numpy as np
 from mirrorbake.envmap import EnvMap
 from mirrorbake.pem.pyramid import coarser_sizes, decimate
 from mirrorbake.prefilter.convolve import Prefilter, ggx, phong
+from mirrorbake.projection import MAP_PROJECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,39 +30,37 @@ class Levels:
     """A rule that makes the coarser levels of a map from other data, so that they need not be stored."""
 
     name: str
-    coarser: Callable[[FloatArray, FloatArray], list[FloatArray]]
-    """Levels (F, s, s, C) below the finest, of the finest (F, S, S, C) and a captured pyramid (texels, 3)."""
+    coarser: Callable[[EnvMap, FloatArray], list[FloatArray]]
+    """Levels (F, s, s, C) below the finest, of the finest and a captured pyramid (texels, 3)."""
 
-    def apply(self, pyramid: FloatArray, size: int, capture: FloatArray) -> FloatArray:
-        """Return a pyramid (texels, C) with its coarser levels made anew."""
-        channels, faces = pyramid.shape[1], faces_of(len(pyramid), size)
-        finest = pyramid[: faces * size * size].reshape(faces, size, size, channels)
-        levels = [finest, *self.coarser(finest, capture)]
+    def apply(
+        self, pyramid: FloatArray, size: int, capture: FloatArray, projection: str = "cube"
+    ) -> FloatArray:
+        """Return a pyramid (texels, C) with its coarser levels made anew; the projection of the maps."""
+        channels, kept = pyramid.shape[1], MAP_PROJECTIONS[projection]
+        finest = pyramid[: kept.faces * size * size].reshape(kept.faces, size, size, channels)
+        levels = [finest, *self.coarser(EnvMap.from_array(finest, kept.projection), capture)]
         return np.concatenate([level.reshape(-1, channels) for level in levels])
 
 
-def faces_of(texels: int, size: int) -> int:
-    """How many faces a pyramid of so many texels has: 6 of a cube, 2 of dual paraboloids."""
-    return texels // sum(side * side for side in (size, *coarser_sizes(size)))
-
-
-def _decimated(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
-    levels = []
+def _decimated(envmap: EnvMap, capture: FloatArray) -> list[FloatArray]:
+    levels, finest = [], envmap.level(0)
     for _ in coarser_sizes(finest.shape[1]):
         finest = decimate(finest)
         levels.append(finest)
     return levels
 
 
-def _solid_angle(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
-    filtered = EnvMap.from_array(finest, "cube" if len(finest) == 6 else "dual_paraboloid").mips("seamless")
+def _solid_angle(envmap: EnvMap, capture: FloatArray) -> list[FloatArray]:
+    filtered = envmap.mips("seamless")
     return [filtered.level(level) for level in range(1, filtered.levels)]
 
 
-def _captured(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
+def _captured(envmap: EnvMap, capture: FloatArray) -> list[FloatArray]:
+    finest = envmap.level(0)
     if finest.shape[3] != 3:
         # Nothing of the object itself is captured from its centre.
-        return _decimated(finest, capture)
+        return _decimated(envmap, capture)
     faces = len(finest)
     levels, start = [], faces * finest.shape[1] ** 2
     for size in coarser_sizes(finest.shape[1]):
@@ -90,15 +89,14 @@ def _ggx_alpha(exponent: float) -> float:
     return float(np.clip(np.tan(0.5 * np.sqrt(2.0 * np.log(2.0) / exponent)), 0.01, 1.0))
 
 
-def _convolved(lobe: Callable[[float], _core.Lobe]) -> Callable[[FloatArray, FloatArray], list[FloatArray]]:
+def _convolved(lobe: Callable[[float], _core.Lobe]) -> Callable[[EnvMap, FloatArray], list[FloatArray]]:
     """Levels convolved from the finest by the lobe of a Phong exponent, as image-based lighting has them."""
 
-    def coarser(finest: FloatArray, capture: FloatArray) -> list[FloatArray]:
-        projection = "cube" if len(finest) == 6 else "dual_paraboloid"
-        convolver = Prefilter(EnvMap.from_array(finest, projection))
+    def coarser(envmap: EnvMap, capture: FloatArray) -> list[FloatArray]:
+        convolver = Prefilter(envmap)
         return [
-            convolver.apply(lobe(_wide_as_texels(size)), size, projection).level(0)
-            for size in coarser_sizes(finest.shape[1])
+            convolver.apply(lobe(_wide_as_texels(size)), size, envmap.projection).level(0)
+            for size in coarser_sizes(envmap.layout.width)
         ]
 
     return coarser

@@ -16,7 +16,7 @@ from mirrorbake.evaluate.evaluate import Onlooker
 from mirrorbake.evaluate.metrics import flip
 from mirrorbake.evaluate.places import View, choose_views
 from mirrorbake.pem.opened import OpenedPem
-from mirrorbake.pem.pyramid import FACES, coarse_end, pyramid_of, size_of
+from mirrorbake.pem.pyramid import coarse_end, pyramid_of, size_of
 from mirrorbake.pem.run_time import RunTime
 from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.load import parse_config
@@ -219,7 +219,7 @@ def _remapped(pem: OpenedPem, settings: Iterable[Setting]) -> tuple[OpenedPem, f
     levels = next((s.levels for s in settings if s.levels is not None), None)
     storage = next((s.storage for s in settings if s.storage is not None), None)
     header = pem.store.header
-    faces = FACES[header.projection]
+    faces = header.faces
     capture = pyramid_of(pem.store.read_capture(), header.projection)
 
     def remap(texels: FloatArray) -> FloatArray:
@@ -227,7 +227,9 @@ def _remapped(pem: OpenedPem, settings: Iterable[Setting]) -> tuple[OpenedPem, f
             texels = storage.apply(texels)
         if levels is None:
             return texels
-        return levels.apply(texels, size_of(len(texels), faces), coarse_end(capture, len(texels)))
+        return levels.apply(
+            texels, size_of(len(texels), faces), coarse_end(capture, len(texels)), header.projection
+        )
 
     size = 0
     # A view in the middle stands for all: they show the same scene.

@@ -35,7 +35,7 @@ def accuracy_of_fits() -> list[Accuracy]:
     size, infinite = mb.TexelTopology.cube(16), proxy.Proxy.infinite()
     count = len(traced.shells)
     stack = [mb.FitShell(infinite, shell) for shell in range(count)]
-    texels, _ = mb.fit_display([mb.DisplayView(lookups, targets)], [stack], [size] * count, run_time=model)
+    texels, *_ = mb.fit_display([mb.DisplayView(lookups, targets)], [stack], [size] * count, run_time=model)
     maps = np.asarray(texels).reshape(count, -1, 4)
     drawn = np.asarray(
         mb.render_reflector(lookups, [[mb.ShellMap(infinite, size, m.copy()) for m in maps]], None, model)

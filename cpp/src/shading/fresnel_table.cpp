@@ -1,6 +1,7 @@
 #include "mirrorbake/shading/fresnel_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 
@@ -14,7 +15,8 @@ namespace {
 
 constexpr std::size_t kMaxSize = 65536;
 
-// Between two entries the error is one bump; the highest of this many samples is within 0.2 % of its top.
+// Between two entries the error is one bump, whose top is that of the parabola through the highest of this many
+// samples and those beside it.
 constexpr int kSamples = 24;
 
 std::vector<float> tabulate(const ReflectanceFunction& reflectance, std::size_t size) {
@@ -29,17 +31,29 @@ std::vector<float> tabulate(const ReflectanceFunction& reflectance, std::size_t 
   return values;
 }
 
+double top_of_bump(const std::array<double, kSamples + 1>& errors) {
+  const auto highest = std::ranges::max_element(errors);
+  if (highest == errors.begin() || highest + 1 == errors.end()) return *highest;
+  const double before = *(highest - 1);
+  const double after = *(highest + 1);
+  const double curvature = before - 2.0 * *highest + after;
+  if (!(curvature < 0.0)) return *highest;
+  return *highest - (before - after) * (before - after) / (8.0 * curvature);
+}
+
 /// Largest error of the table, or the first one found above `limit`.
 double error_of(const std::vector<float>& values, const ReflectanceFunction& reflectance, double limit) {
   const std::size_t intervals = values.size() - 1;
+  std::array<double, kSamples + 1> errors{};
   double worst = 0;
   for (std::size_t i = 0; i < intervals && worst <= limit; ++i) {
-    for (int sample = 0; sample <= kSamples; ++sample) {
+    for (std::size_t sample = 0; sample < errors.size(); ++sample) {
       const double f = static_cast<double>(sample) / kSamples;
       const double value = values[i] + f * (static_cast<double>(values[i + 1]) - values[i]);
       const double c = (static_cast<double>(i) + f) / static_cast<double>(intervals);
-      worst = std::max(worst, std::abs(value - reflectance(c)));
+      errors[sample] = std::abs(value - reflectance(c));
     }
+    worst = std::max(worst, top_of_bump(errors));
   }
   return worst;
 }

@@ -30,7 +30,8 @@ TEST(FresnelTable, MeetsTheWantedErrorWithTheFewestEntries) {
     for (double wanted : {0.1, 1e-2, 1e-3, 1e-5}) {
       const FresnelTable table = table_for_error(exact, wanted);
       const double error = largest_error(table, exact);
-      EXPECT_LE(error, wanted * 1.002);  // 24 samples per interval see the error to 0.2 %
+      // Tops of bumps are interpolated by parabolas.
+      EXPECT_LE(error, wanted * (1.0 + 1e-4));
       EXPECT_NEAR(table.max_error, error, 0.003 * error);
       if (table.values.size() > 2) {
         EXPECT_GT(largest_error(make_table(exact, table.values.size() - 1), exact), wanted * 0.99);

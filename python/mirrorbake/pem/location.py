@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import zarr.storage
 from zarr.core.sync import sync
 
-from mirrorbake.errors import StoreError
+from mirrorbake.errors import InputError, StoreError
 from mirrorbake.files import atomic_output
 
 if TYPE_CHECKING:
@@ -118,6 +118,8 @@ class Location:
             self.path.parent.mkdir(exist_ok=True)
             with atomic_output(self.path) as temporary:
                 temporary.write_bytes(content)
+        except InputError as failure:  # says already that the file cannot be written
+            raise StoreError(str(failure)) from None
         # As above; NotImplementedError has no words of its own.
         except Exception as failure:
             words = getattr(failure, "strerror", None) or str(failure)

@@ -6,8 +6,11 @@
 #include <meshoptimizer.h>
 #include <webp/encode.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -101,34 +104,90 @@ TEST_F(GltfVariants, FacetsWithoutNormalsAreFlat) {
   }
 }
 
-TEST_F(GltfVariants, DracoMeshesAreDecoded) {
+// A quadrilateral in Draco's form: positions of `Position`, and colours of bytes that Draco itself takes for
+// whole numbers.
+struct DracoQuad {
+  std::string bytes;
+  std::uint32_t positions = 0;
+  std::uint32_t colors = 0;
+};
+
+template <typename Position>
+DracoQuad draco_quad(draco::DataType type, const std::array<Position, 12>& corners) {
   draco::TriangleSoupMeshBuilder builder;
   builder.Start(2);
-  const int id = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
-  const auto corner = [](std::uint16_t i) { return kQuad.data() + 3 * i; };
-  for (int f = 0; f < 2; ++f) {
-    const std::uint16_t* t = kTriangles.data() + 3 * f;
-    builder.SetAttributeValuesForFace(id, draco::FaceIndex(static_cast<std::uint32_t>(f)), corner(t[0]),
-                                      corner(t[1]), corner(t[2]));
+  const int positions = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, type);
+  const int colors = builder.AddAttribute(draco::GeometryAttribute::COLOR, 3, draco::DT_UINT8);
+  const std::array<std::uint8_t, 3> color = {255, 51, 0};
+  const auto corner = [&](std::uint16_t i) { return corners.data() + std::size_t{3} * i; };
+  for (std::uint32_t f = 0; f < 2; ++f) {
+    const std::uint16_t* t = kTriangles.data() + std::size_t{3} * f;
+    builder.SetAttributeValuesForFace(positions, draco::FaceIndex(f), corner(t[0]), corner(t[1]),
+                                      corner(t[2]));
+    builder.SetAttributeValuesForFace(colors, draco::FaceIndex(f), color.data(), color.data(), color.data());
   }
   const auto mesh = builder.Finalize();
-  const std::uint32_t unique = mesh->attribute(id)->unique_id();
   draco::EncoderBuffer encoded;
-  ASSERT_TRUE(draco::Encoder().EncodeMeshToBuffer(*mesh, &encoded).ok());
-  const std::string bytes(encoded.data(), encoded.size());
+  EXPECT_TRUE(draco::Encoder().EncodeMeshToBuffer(*mesh, &encoded).ok());
+  return {std::string(encoded.data(), encoded.size()), mesh->attribute(positions)->unique_id(),
+          mesh->attribute(colors)->unique_id()};
+}
+
+std::string draco_primitive(const DracoQuad& quad) {
+  return R"({"attributes":{"POSITION":0,"COLOR_0":2},"indices":1,"extensions":{"KHR_draco_mesh_compression":
+      {"bufferView":0,"attributes":{"POSITION":)" +
+         std::to_string(quad.positions) + R"(,"COLOR_0":)" + std::to_string(quad.colors) + "}}}}";
+}
+
+constexpr const char* kColors = R"(,{"componentType":5121,"normalized":true,"count":4,"type":"VEC3"})";
+
+TEST_F(GltfVariants, DracoMeshesAreDecoded) {
+  const DracoQuad quad = draco_quad<float>(draco::DT_FLOAT32, {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0});
   const auto json = [&](const std::string& content) {
     return document(
-        R"({"attributes":{"POSITION":0},"indices":1,"extensions":{"KHR_draco_mesh_compression":{"bufferView":0,
-        "attributes":{"POSITION":)" +
-            std::to_string(unique) + "}}}}",
-        kAccessors, view(0, content.size()), content, "",
+        draco_primitive(quad), std::string(kAccessors) + kColors, view(0, content.size()), content, "",
         R"("extensionsRequired":["KHR_draco_mesh_compression"],"extensionsUsed":["KHR_draco_mesh_compression"],)");
   };
-  const LoadedScene loaded = load(json(bytes));
+  const LoadedScene loaded = load(json(quad.bytes));
   EXPECT_THAT(loaded.warnings, IsEmpty());
-  EXPECT_NEAR(testing::total_area(loaded.scene.objects.at(0).mesh), 1.0, 1e-3);
-  EXPECT_THAT(error_of(json(bytes.substr(0, bytes.size() / 2))), HasSubstr("Draco mesh that is damaged"));
+  const TriangleMesh& mesh = loaded.scene.objects.at(0).mesh;
+  EXPECT_NEAR(testing::total_area(mesh), 1.0, 1e-3);
+  ASSERT_THAT(mesh.colors, SizeIs(mesh.positions.size()));
+  for (const glm::vec3 color : mesh.colors) EXPECT_LT(glm::length(color - glm::vec3(1, 0.2F, 0)), 1e-6F);
+  EXPECT_THAT(error_of(json(quad.bytes.substr(0, quad.bytes.size() / 2))),
+              HasSubstr("Draco mesh that is damaged"));
   EXPECT_THAT(error_of(json(std::string(40, 'x'))), HasSubstr("Draco mesh that is damaged"));
+}
+
+// What whole numbers stand for is the accessor's to say; meshoptimizer may have packed Draco's bytes.
+TEST_F(GltfVariants, DracoMeshesMayBeQuantisedAndPackedByMeshoptBesides) {
+  const DracoQuad quad = draco_quad<std::int16_t>(
+      draco::DT_INT16, {-32768, 0, 0, 32767, 0, 0, 32767, 32767, 0, -32768, 32767, 0});
+  std::string padded = quad.bytes;  // vertices of four bytes, of which Draco reads what it needs
+  padded.resize((padded.size() + 3) / 4 * 4, '\0');
+  const std::size_t count = padded.size() / 4;
+  std::vector<unsigned char> packed(meshopt_encodeVertexBufferBound(count, 4));
+  packed.resize(meshopt_encodeVertexBuffer(packed.data(), packed.size(), padded.data(), count, 4));
+  const std::string accessor = R"({"componentType":5122,"count":4,"type":"VEC3","normalized":)";
+  const std::string rest = std::string(R"(},{"componentType":5123,"count":6,"type":"SCALAR"})") + kColors;
+  const std::string extra =
+      R"("extensionsRequired":["KHR_draco_mesh_compression","KHR_mesh_quantization","EXT_meshopt_compression"],)";
+  for (const auto& [normalized, size] : {std::pair("true", 2.0), std::pair("false", 65535.0 * 32767.0)}) {
+    const std::string json =
+        document(draco_primitive(quad), accessor + normalized + rest,
+                 R"({"buffer":1,"byteLength":)" + std::to_string(padded.size()) +
+                     R"(,"extensions":{"EXT_meshopt_compression":{"buffer":0,"byteLength":)" +
+                     std::to_string(packed.size()) + R"(,"byteStride":4,"count":)" + std::to_string(count) +
+                     R"(,"mode":"ATTRIBUTES"}}})",
+                 std::string(packed.begin(), packed.end()),
+                 R"(,{"byteLength":)" + std::to_string(padded.size()) +
+                     R"(,"extensions":{"EXT_meshopt_compression":{"fallback":true}}})",
+                 extra);
+    const LoadedScene loaded = load(json);
+    EXPECT_THAT(loaded.warnings, IsEmpty());
+    // −32768 and −32767 are both −1, as glTF 2.0 §3.11 has it.
+    EXPECT_NEAR(testing::total_area(loaded.scene.objects.at(0).mesh) / size, 1.0, 1e-6);
+  }
 }
 
 TEST_F(GltfVariants, MeshoptViewsAreDecoded) {

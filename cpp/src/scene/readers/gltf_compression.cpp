@@ -4,9 +4,12 @@
 #include <draco/mesh/mesh.h>
 #include <meshoptimizer.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "loaded_mesh.hpp"
@@ -69,14 +72,40 @@ std::vector<glm::uvec3> DracoMesh::triangles() const {
   return result;
 }
 
-Numbers DracoMesh::numbers(const std::string& attribute, int components) const {
+namespace {
+
+// Draco's own flag for fractions is not what counts, and its -128/127 is not in [-1, 1].
+bool read_value(const draco::PointAttribute& source, draco::AttributeValueIndex value, bool is_normalized,
+                std::span<float> to) {
+  const auto count = static_cast<std::uint8_t>(to.size());
+  if (!draco::IsDataTypeIntegral(source.data_type())) {
+    return source.ConvertValue<float>(value, count, to.data());
+  }
+  std::array<std::int64_t, 4> whole{};
+  if (!source.ConvertValue<std::int64_t>(value, count, whole.data())) return false;
+  const int bits = 8 * draco::DataTypeLength(source.data_type());
+  const bool is_signed = source.data_type() == draco::DT_INT8 || source.data_type() == draco::DT_INT16 ||
+                         source.data_type() == draco::DT_INT32 || source.data_type() == draco::DT_INT64;
+  const double one = std::ldexp(1.0, is_signed ? bits - 1 : bits) - 1.0;
+  for (std::size_t k = 0; k < to.size(); ++k) {
+    const auto number = static_cast<double>(whole[k]);
+    to[k] = static_cast<float>(is_normalized ? std::max(number / one, -1.0) : number);
+  }
+  return true;
+}
+
+}  // namespace
+
+Numbers DracoMesh::numbers(const std::string& attribute, int components,
+                           const tinygltf::Accessor& accessor) const {
   if (!state_->attributes.IsObject() || !state_->attributes.Has(attribute)) return {};
   const draco::Mesh& mesh = *state_->mesh;
   const std::uint64_t id = whole_number(path_, state_->attributes, attribute.c_str(), kDraco);
   const draco::PointAttribute* source = mesh.GetAttributeByUniqueId(static_cast<std::uint32_t>(id));
   if (source == nullptr) fail(path_, "has a Draco mesh without the attribute " + attribute);
   const int count = source->num_components();
-  if (components == 0 ? count != 3 && count != 4 : count != components) {
+  const bool fits = components == 0 ? count == 3 || count == 4 : count == components;
+  if (!fits || count > 4) {
     fail(path_, "has a Draco mesh whose " + attribute + " has " + std::to_string(count) + " components");
   }
   Numbers result;
@@ -85,9 +114,10 @@ Numbers DracoMesh::numbers(const std::string& attribute, int components) const {
   result.values.resize(result.count * static_cast<std::size_t>(count));
   for (draco::PointIndex point(0); point < mesh.num_points(); ++point) {
     const draco::AttributeValueIndex value = source->mapped_index(point);
-    float* to = result.values.data() + std::size_t{point.value()} * static_cast<std::size_t>(count);
-    if (value.value() >= source->size() ||
-        !source->ConvertValue<float>(value, static_cast<std::int8_t>(count), to)) {
+    const auto to = std::span(result.values)
+                        .subspan(std::size_t{point.value()} * static_cast<std::size_t>(count),
+                                 static_cast<std::size_t>(count));
+    if (value.value() >= source->size() || !read_value(*source, value, accessor.normalized, to)) {
       fail(path_, "has a Draco mesh whose " + attribute + " is damaged");
     }
   }

@@ -30,8 +30,9 @@ class DracoMesh {
   DracoMesh& operator=(const DracoMesh&) = delete;
 
   std::vector<glm::uvec3> triangles() const;
-  /// Rows of an attribute, empty if the primitive lacks it; `components` 0 stands for 3 or 4.
-  Numbers numbers(const std::string& attribute, int components) const;
+  /// Rows of an attribute, empty if the primitive lacks it; `components` 0 stands for 3 or 4. What whole
+  /// numbers stand for is the accessor's to say, as if they were not compressed.
+  Numbers numbers(const std::string& attribute, int components, const tinygltf::Accessor& accessor) const;
 
  private:
   struct State;

@@ -207,14 +207,20 @@ class GltfBuilder {
         gltf::element_count(path_, model_, attribute(primitive, "POSITION"), "position");
     check_limits(path_, loaded_.mesh.positions.size() + count, loaded_.mesh.triangles.size(), limits_);
     const gltf::DracoMesh mesh(path_, model_, extension, limits_);
+    const auto numbers = [&](const std::string& name, int components) {
+      const int accessor = attribute(primitive, name);
+      if (accessor < 0) return gltf::Numbers{};
+      return mesh.numbers(name, components,
+                          gltf::element(path_, model_.accessors, accessor, name + " accessor"));
+    };
     Vertices result;
-    set_rows(mesh.numbers("POSITION", 3), result.positions);
+    set_rows(numbers("POSITION", 3), result.positions);
     if (result.positions.empty()) fail(path_, "a Draco mesh has no positions");
     result.triangles = mesh.triangles();
-    set_normals(mesh.numbers("NORMAL", 3), result);
-    set_tangents(mesh.numbers("TANGENT", 4), result);
-    set_uvs(mesh.numbers(uv_name(primitive), 2), result);
-    set_colors(mesh.numbers("COLOR_0", 0), result);
+    set_normals(numbers("NORMAL", 3), result);
+    set_tangents(numbers("TANGENT", 4), result);
+    set_uvs(numbers(uv_name(primitive), 2), result);
+    set_colors(numbers("COLOR_0", 0), result);
     return result;
   }
 

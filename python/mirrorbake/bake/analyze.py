@@ -21,6 +21,7 @@ from mirrorbake.bake.probe import (
 from mirrorbake.bake.quality import QUALITIES, quality_decisions
 from mirrorbake.bake.shell_shapes import planned_shells
 from mirrorbake.bake.split_shells import shells_decision
+from mirrorbake.bake.trial import lead_advice
 from mirrorbake.bake.worth import advice_of, shared_distant
 from mirrorbake.proxy import proxy_to_attributes
 from mirrorbake.scene.config_shells import DEFAULT_SHELLS, ITSELF
@@ -98,7 +99,9 @@ def analyze(stage: Stage) -> Plan:
     ]
     of_last = (size.value for size in sizes if size.shell in (None, planned[-1].name))
     advice = advice_of(stage, probe, single, max(cast("int", size) for size in of_last))
-    return Plan(tuple(decisions), proxy_to_attributes(proxy), planned, tuple(advice))
+    plan = Plan(tuple(decisions), proxy_to_attributes(proxy), planned, tuple(advice))
+    lead = lead_advice(stage, plan)
+    return plan if lead is None else replace(plan, advice=(lead, *plan.advice))
 
 
 def _is_local(local: Sequence[Decision], part: str) -> bool:

@@ -1,0 +1,49 @@
+"""How far a PEM's lead reaches: the study, on scenes that take a moment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from mirrorbake.scene.load import parse_config
+from mirrorbake.study.reach import BEYOND, INSIDE, measured
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SMALL: dict[str, Any] = {
+    "reflector": {"object": "teapot", "subdivisions": 6, "parts": "split"},
+    "maps": {"size": 16, "distant": "box"},
+    "layers": {"local": False},
+    "trace": {"samples": 16, "noise": 0, "depth": 0, "indirect": "none"},
+    "auto": {"quality": "draft"},
+}
+
+
+def test_an_arc_is_looked_at_between_its_samples_and_beyond(tmp_path: Path) -> None:
+    views = {"count": 2, "degrees": 1.0, "start": 22.0, "size": [48, 36]}
+    config = parse_config({**SMALL, "views": views, "static": {"views": 6}}, "arc")
+    looks = measured(config, tmp_path / "pem")
+    assert [look.place for look in looks] == ["half-way", *(f"{degrees:g}° off" for degrees in BEYOND)]
+    assert looks[0].pem > looks[0].captured + 3.0
+    assert looks[0].pem > looks[-1].pem
+    assert all(look.static_set is not None for look in looks)
+    # Far off the samples little but the static set is drawn.
+    assert looks[-1].pem == pytest.approx(looks[-1].static_set, abs=1.5)
+
+
+def test_a_dome_is_looked_at_inside(tmp_path: Path) -> None:
+    views = {
+        "kind": "dome",
+        "start": 15,
+        "degrees": 10,
+        "count": 2,
+        "elevation": [15, 25],
+        "rings": 2,
+        "size": [48, 36],
+    }
+    looks = measured(parse_config({**SMALL, "views": views}, "dome"), tmp_path / "pem")
+    assert [look.place for look in looks] == ["inside"] * INSIDE
+    assert all(look.static_set is None for look in looks)
+    assert all(look.noise > 10.0 for look in looks)

@@ -25,6 +25,8 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
+    from mirrorbake.envmap import EnvMap
+
 FOLDER = Path(__file__).parents[1] / "build" / "public-files"
 
 # Packages that ship models or images, in versions that do not change.
@@ -33,6 +35,14 @@ PYPI = ("genesis-world==1.4.5", "pybullet==3.2.7", "ursina==7.0.0")
 
 SCENES = (".gltf", ".glb", ".obj")
 IMAGES = (".hdr", ".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
+MAPS = (".ktx2", ".dds")
+KINDS = {
+    "glTF": (".gltf", ".glb"),
+    "OBJ": (".obj",),
+    "HDR and EXR": (".hdr", ".exr"),
+    "PNG, JPEG, TIFF and WebP": (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"),
+    "KTX2 and DDS": MAPS,
+}
 SECONDS = 60.0
 BYTES = 4 << 30
 
@@ -80,6 +90,7 @@ def unpack_modules(folder: Path) -> None:
 def serve(connection: Connection) -> None:
     """Load the files that are named, one after the other; answers None, or what was said."""
     import mirrorbake
+    from mirrorbake.envmap import EnvMap
 
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
     while True:
@@ -87,12 +98,24 @@ def serve(connection: Connection) -> None:
         try:
             if path.suffix.lower() in SCENES:
                 mirrorbake.load_scene(path)
+            elif path.suffix.lower() in MAPS:
+                load_map(EnvMap, path)
             else:
                 mirrorbake.load_image(path)
         except (mirrorbake.InvalidArgument, mirrorbake.FileError, MemoryError) as failure:
             connection.send(str(failure) or type(failure).__name__)
         else:
             connection.send(None)
+
+
+def load_map(envmap: type[EnvMap], path: Path) -> None:
+    """Load a cube map, or any picture: of one of another shape than a panorama's it is said what it is."""
+    try:
+        envmap.load(path)
+    except OSError as failure:
+        if "or a named projection" not in str(failure):
+            raise
+        envmap.load(path, "latlong")
 
 
 class Loader:
@@ -134,11 +157,11 @@ def main() -> None:
     failures = 0
     for folder in arguments.folders or fetch():
         start = time.perf_counter()
-        files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in (*SCENES, *IMAGES))
+        files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in (*SCENES, *IMAGES, *MAPS))
         for path in files:
             kind, words = loader.load(path)
-            suffix = path.suffix.lower()
-            counts.setdefault(suffix, Counter())[kind] += 1
+            name = next(name for name, suffixes in KINDS.items() if path.suffix.lower() in suffixes)
+            counts.setdefault(name, Counter())[kind] += 1
             failures += kind in ("crash", "hang")
             if kind != "loaded":
                 print(f"{kind}: {path.relative_to(folder)}: {words}", file=sys.stderr)
@@ -148,10 +171,14 @@ def main() -> None:
 
         print(json.dumps(counts, indent=1))
     else:
-        for suffix, found in sorted(counts.items()):
+        for name in KINDS:
+            found = counts.get(name, Counter())
             total = found.total()
+            if total == 0:
+                print(f"{name:24}     0 files")
+                continue
             kinds = ", ".join(f"{number} {kind}" for kind, number in found.most_common())
-            print(f"{suffix:6} {total:5} files: {100.0 * found['loaded'] / total:5.1f} % load ({kinds})")
+            print(f"{name:24} {total:5} files: {100.0 * found['loaded'] / total:5.1f} % load ({kinds})")
     sys.exit(1 if failures else 0)
 
 

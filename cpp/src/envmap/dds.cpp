@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "bc6h.hpp"
@@ -176,6 +177,19 @@ void save_dds_bc6h(const std::string& path, const EnvMapLayout& layout, std::spa
   write_file(path, out.bytes);
 }
 
+namespace {
+
+// Four letters, such as DXT5, or a number of Direct3D 9's.
+std::string name_of_code(std::uint32_t code) {
+  std::string letters;
+  for (int shift = 0; shift < 32; shift += 8) letters += static_cast<char>(code >> shift & 0xffU);
+  const bool is_text =
+      std::all_of(letters.begin(), letters.end(), [](char letter) { return letter > ' ' && letter <= '~'; });
+  return is_text ? letters : std::to_string(code);
+}
+
+}  // namespace
+
 EnvMap load_dds(const std::string& path, const ImageLimits& limits) {
   return read_dds(path, *image_files::open_bytes(path), limits);
 }
@@ -195,7 +209,7 @@ EnvMap read_dds(const std::string& path, const image_files::Bytes& bytes, const 
   });
   if (format == kFormats.end()) {
     const std::string found = dx10       ? "the DXGI format " + std::to_string(dxgi)
-                              : has_code ? "the format code " + std::to_string(code)
+                              : has_code ? "the format code " + name_of_code(code)
                                          : "pixels of integers";
     throw FileError(
         path,

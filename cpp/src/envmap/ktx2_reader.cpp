@@ -5,16 +5,22 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
 #include "cube_file.hpp"
 #include "ktx2_file.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/text.hpp"
+#include "mirrorbake/image/primaries.hpp"
 #include "texel_format.hpp"
 
 namespace mirrorbake {
@@ -63,8 +69,8 @@ struct DataFormat {
   std::uint8_t flags = 0;
 };
 constexpr std::uint8_t kModelEtc1s = 163, kModelUastc = 166;
-constexpr std::uint8_t kPrimariesRec709 = 1;
-constexpr std::uint8_t kTransferSrgb = 2;  // 1 is linear, 0 says nothing
+constexpr std::uint8_t kPrimariesRec709 = 1;  // 0 says nothing
+constexpr std::uint8_t kTransferSrgb = 2;     // 1 is linear, 0 says nothing
 constexpr std::uint8_t kPremultiplied = 1;
 
 struct Header {
@@ -72,10 +78,35 @@ struct Header {
   EnvMapLayout layout;
   bool is_picture = false;
   bool is_premultiplied = false;
+  std::uint8_t primaries = 0;
   Packing packing = Packing::none;
   std::string swizzle;
   std::string orientation;
 };
+
+// Chromaticities of the Khronos Data Format Specification 1.3, §14.1, all with the white D65.
+std::optional<image_files::Primaries> known_primaries(std::uint8_t number) {
+  constexpr glm::dvec2 d65(0.3127, 0.3290);
+  switch (number) {
+    case 2: return image_files::Primaries{{{0.640, 0.330}, {0.290, 0.600}, {0.150, 0.060}, d65}};
+    case 3: return image_files::Primaries{{{0.630, 0.340}, {0.310, 0.595}, {0.155, 0.070}, d65}};
+    case 4: return image_files::Primaries{{{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, d65}};
+    case 10: return image_files::Primaries{{{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, d65}};
+    case 11: return image_files::Primaries{{{0.640, 0.330}, {0.210, 0.710}, {0.150, 0.060}, d65}};
+    default: return std::nullopt;
+  }
+}
+
+// The same light by Rec. 709's numbers, which may be below 0. Grey is grey under the one white.
+void convert_primaries(EnvMap& map, const image_files::Primaries& primaries) {
+  const auto channels = static_cast<std::size_t>(map.layout.channels);
+  if (channels < 3) return;
+  const glm::dmat3 converted = image_files::rec709_from_xyz() * image_files::xyz_from_rgb(primaries);
+  for (std::size_t i = 0; i < map.values.size(); i += channels) {
+    const glm::dvec3 color = converted * glm::dvec3(map.values[i], map.values[i + 1], map.values[i + 2]);
+    for (int c = 0; c < 3; ++c) map.values[i + static_cast<std::size_t>(c)] = static_cast<float>(color[c]);
+  }
+}
 
 std::string name_of(std::uint32_t vk_format) {
   std::string number = "VkFormat " + std::to_string(vk_format);
@@ -115,9 +146,10 @@ TexelFormat texel_format(const std::string& name, std::uint32_t vk_format, const
     throw FileError(name, "has texels of the transfer function " + std::to_string(data.transfer) +
                               ", expected linear ones, or integers of sRGB");
   }
-  if (data.primaries > kPrimariesRec709) {
+  if (data.primaries > kPrimariesRec709 && !known_primaries(data.primaries)) {
     throw FileError(name, "has colours of the primaries " + std::to_string(data.primaries) +
-                              " of the Khronos Data Format, expected those of Rec. 709, 1");
+                              " of the Khronos Data Format, expected those of Rec. 709, Rec. 601, Rec. 2020, "
+                              "Display P3 or Adobe RGB");
   }
   format.is_srgb = format.is_srgb || data.transfer == kTransferSrgb;
   return format;
@@ -174,6 +206,7 @@ Header read_header(const FileBytes& in, const std::string& name, const ImageLimi
   const DataFormat data = data_format(in);
   header.format = texel_format(name, in.get<std::uint32_t>(12), data);
   header.is_premultiplied = (data.flags & kPremultiplied) != 0;
+  header.primaries = data.primaries;
   const auto width = in.get<std::uint32_t>(20);
   const auto height = in.get<std::uint32_t>(24);
   const auto layers = in.get<std::uint32_t>(32);
@@ -351,6 +384,7 @@ MapFile read_ktx2(const std::string& name, const image_files::Bytes& bytes, cons
   }
   if (header.is_picture && !header.orientation.empty()) turn_upright(header.orientation, file.map);
   if (!header.swizzle.empty()) file.map = swizzled(std::move(file.map), header.swizzle);
+  if (const auto primaries = known_primaries(header.primaries)) convert_primaries(file.map, *primaries);
   // Floats with alpha are kept as they are, as save_ktx2 writes them.
   if (file.map.layout.channels == 4 && header.format.is_integer() && !header.is_premultiplied) {
     multiply_by_alpha(file.map.values);

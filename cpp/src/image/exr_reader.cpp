@@ -25,7 +25,7 @@
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "mirrorbake/core/text.hpp"
-#include "primaries.hpp"
+#include "mirrorbake/image/primaries.hpp"
 
 namespace mirrorbake::image_files {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "image_files.hpp"
 #include "mirrorbake/core/error.hpp"
-#include "primaries.hpp"
+#include "mirrorbake/image/primaries.hpp"
 
 namespace mirrorbake::image_files {
 namespace {

@@ -1,4 +1,4 @@
-#include "primaries.hpp"
+#include "mirrorbake/image/primaries.hpp"
 
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>

@@ -13,6 +13,7 @@
 #include <limits>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "mirrorbake/core/error.hpp"
@@ -122,6 +123,18 @@ TEST_F(Dds, OlderHeadersAreReadAndOtherPixelsAreNamed) {
   set_word(old, 84, 116);  // D3DFMT_A32B32G32R32F
   write_file(path("old.dds"), old);
   EXPECT_EQ(load_envmap(path("old.dds")).values, map.values);
+
+  for (const auto& [code, words] :
+       {std::pair(0x35545844U, "format code DXT5"), std::pair(117U, "format code 117")}) {
+    set_word(old, 84, code);
+    write_file(path("code.dds"), old);
+    try {
+      load_dds(path("code.dds"));
+      ADD_FAILURE() << words << " was read";
+    } catch (const FileError& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(words));
+    }
+  }
 
   std::vector<std::byte> compressed = bytes_of("a.dds");
   set_word(compressed, 128, 98);  // DXGI_FORMAT_BC7_UNORM

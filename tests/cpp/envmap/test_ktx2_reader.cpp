@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -251,6 +252,26 @@ TEST(Ktx2Reader, SwizzlesAreFollowed) {
   EXPECT_THAT(refusal(file), testing::HasSubstr("swizzle 'rgbx'"));
 }
 
+// White is white; Display P3's red is Rec. 709's (1.2249, -0.0421, -0.0196), from the chromaticities of SMPTE
+// EG 432-1 by the arithmetic of SMPTE RP 177, rounded to four digits.
+TEST(Ktx2Reader, ColoursOfOtherPrimariesAreThoseOfRec709) {
+  Ktx2 file;
+  file.faces = 1;
+  file.width = 2;
+  file.transfer = 1;
+  file.vk_format = 37;  // R8G8B8A8_UNORM
+  file.primaries = 10;
+  file.levels = {{255, 255, 255, 255, 255, 0, 0, 255}};
+  const std::vector<float> expected = {1.0F, 1.0F, 1.0F, 1.0F, 1.2249F, -0.0421F, -0.0196F, 1.0F};
+  EXPECT_THAT(load(file).values, testing::Pointwise(testing::FloatNear(1e-4F), expected));
+  for (const std::uint8_t primaries : std::initializer_list<std::uint8_t>{2, 3, 4, 11}) {
+    file.primaries = primaries;
+    const EnvMap map = load(file);
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(map.values[c], 1.0F, 1e-6F);
+    EXPECT_EQ(map.values[7], 1.0F);
+  }
+}
+
 TEST(Ktx2Reader, WhatIsNotReadIsRefusedByName) {
   const Ktx2 good{.levels = {noise(24)}};
   EXPECT_EQ(refusal(good), "");
@@ -274,7 +295,7 @@ TEST(Ktx2Reader, WhatIsNotReadIsRefusedByName) {
   EXPECT_THAT(with([](Ktx2& f) { f.vk_format = 146; }), HasSubstr("VkFormat 146, blocks of BC1 to BC7"));
   EXPECT_THAT(with([](Ktx2& f) { f.vk_format = 157; }), HasSubstr("blocks of ASTC"));
   EXPECT_THAT(with([](Ktx2& f) { f.vk_format = 97; }), HasSubstr("transfer function 2"));
-  EXPECT_THAT(with([](Ktx2& f) { f.primaries = 10; }), HasSubstr("primaries 10"));
+  EXPECT_THAT(with([](Ktx2& f) { f.primaries = 6; }), HasSubstr("primaries 6"));
   EXPECT_THAT(with([](Ktx2& f) { f.layers = 3; }), HasSubstr("an array of 3 maps"));
   EXPECT_THAT(with([](Ktx2& f) { f.depth = 4; }), HasSubstr("depth 4"));
   EXPECT_THAT(with([](Ktx2& f) { f.height = 2; }), HasSubstr("faces of 1 x 2 texels"));

@@ -5,6 +5,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 
+/// Colours of other primaries than the library's own.
 namespace mirrorbake::image_files {
 
 /// CIE xy chromaticities of red, green, blue and white.

@@ -19,6 +19,8 @@ from mirrorbake.scene.pose import rotation_matrix
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
 # A 1 x 2 x 4 cuboid away from the origin, no normals, faces counter-clockwise from outside.
 CUBOID = """
 v 5 5 5
@@ -172,6 +174,36 @@ def test_a_panorama_of_one_channel_is_grey_and_of_others_is_rejected(tmp_path: P
     assert built.scene.object_names == ["ground", "reflector"]
     with pytest.raises(_core.FileError, match=r"odd\.exr: has the channels X, Y, Z, expected colours"):
         build(surroundings={"panorama": str(odd)})
+
+
+def seen_from_inside(**surroundings: Any) -> NDArray[np.float32]:
+    """Mean of what arrives at a point from all around."""
+    built = build(surroundings=surroundings)
+    options = _core.TraceOptions(samples_per_pixel=1)
+    tracer = _core.Tracer(built.scene, _core.TracerOptions(indirect="none"))
+    captured = tracer.capture((0.0, 5.0, 0.0), "latlong", 16, 8, [built.reflector], options)
+    mean: NDArray[np.float32] = captured.reshape(-1, 3).mean(axis=0)
+    return mean
+
+
+def test_a_layer_of_a_panorama_is_chosen_and_depth_and_alpha_are_no_light(tmp_path: Path) -> None:
+    path = tmp_path / "layers.exr"
+    names = [f"{layer}.{channel}" for layer in ("sky", "sun") for channel in "RGBAZ"]
+    values = np.array([1, 2, 3, 1, 90, 4, 5, 6, 1, 90], np.float32)
+    _core.save_image(str(path), np.tile(values, (4, 8, 1)), names)
+    for layer, colour in (("sky", [1, 2, 3]), ("sun", [4, 5, 6])):
+        np.testing.assert_allclose(seen_from_inside(panorama=str(path), layer=layer), colour, rtol=1e-5)
+    with pytest.raises(_core.FileError, match="has no layer 'moon', expected one of sky, sun"):
+        build(surroundings={"panorama": str(path), "layer": "moon"})
+
+
+def test_a_square_is_no_panorama_and_a_strip_of_faces_is_a_cube(tmp_path: Path) -> None:
+    square, strip = tmp_path / "square.exr", tmp_path / "strip.exr"
+    _core.save_image(str(square), np.ones((8, 8, 3), np.float32), ["R", "G", "B"])
+    _core.save_image(str(strip), np.full((8, 48, 3), [1, 2, 3], np.float32), ["R", "G", "B"])
+    with pytest.raises(_core.FileError, match=r"square\.exr: has 8 x 8 pixels, expected a panorama"):
+        build(surroundings={"panorama": str(square)})
+    np.testing.assert_allclose(seen_from_inside(panorama=str(strip)), [1, 2, 3], rtol=1e-3)
 
 
 @pytest.mark.parametrize(

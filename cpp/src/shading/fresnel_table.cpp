@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::size_t kMaxSize = 65536;
 
-// Between two entries the error is one bump, whose top is that of the parabola through the highest of this many
-// samples and those beside it.
+// Between two entries the error is one bump, whose top is that of the parabola through the highest of this
+// many samples and those beside it.
 constexpr int kSamples = 24;
 
 std::vector<float> tabulate(const ReflectanceFunction& reflectance, std::size_t size) {

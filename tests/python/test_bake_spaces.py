@@ -36,6 +36,7 @@ from mirrorbake.pem.view_images import images_of_trace
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.tone import srgb_encoded
+from web_server import served
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -452,5 +453,13 @@ def test_a_pem_at_a_url_is_evaluated_and_reported_like_one_in_a_folder(tmp_path:
         report(url)
     page = report(url, tmp_path / "page.html").read_text(encoding="utf-8")
     assert "maps on disk" in page
+    with served(tmp_path / "pem") as address:
+        read_only = evaluate(address)
+        from_the_web = report(address, tmp_path / "web.html").read_text(encoding="utf-8")
+    # Nothing can be written there, which is said; the figures are those of the references that lie there.
+    assert not read_only.written
+    assert any("metrics.json: cannot write" in note for note in read_only.notes)
+    assert [view.metrics for view in read_only.views] == [view.metrics for view in again.views]
+    assert "maps on disk" in from_the_web
     with pytest.raises(StoreError, match=r"unknown://x/metrics\.json: cannot write: "):
         Location("unknown://x").joined("metrics.json").write_bytes(b"")

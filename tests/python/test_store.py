@@ -2,12 +2,9 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import http.server
 import json
-import re
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -480,48 +477,15 @@ def test_a_pem_lies_on_an_object_store_as_on_a_disk(tmp_path: Path) -> None:
 
 
 def test_a_pem_is_read_from_a_web_server(tmp_path: Path) -> None:
+    # Other processes import this file without the folder of the helpers.
+    from web_server import served
+
     fill(make_store(tmp_path))
-
-    class Server(http.server.BaseHTTPRequestHandler):
-        """As any static host: whole files and ranges of bytes."""
-
-        def do_HEAD(self) -> None:
-            self.answer(body=False)
-
-        def do_GET(self) -> None:
-            self.answer(body=True)
-
-        def answer(self, *, body: bool) -> None:
-            path = tmp_path / self.path.lstrip("/")
-            if not path.is_file():
-                self.send_error(404)
-                return
-            content = path.read_bytes()
-            wanted = re.fullmatch(r"bytes=(\d*)-(\d*)", self.headers.get("Range", ""))
-            if wanted:
-                first = int(wanted[1]) if wanted[1] else len(content) - int(wanted[2])
-                last = int(wanted[2]) if wanted[1] and wanted[2] else len(content) - 1
-                part = content[first : last + 1]
-                self.send_response(206)
-                self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(content)}")
-            else:
-                part = content
-                self.send_response(200)
-            self.send_header("Content-Length", str(len(part)))
-            self.end_headers()
-            if body:
-                self.wfile.write(part)
-
-        def log_message(self, *arguments: Any) -> None:
-            pass
-
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Server) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        store = PemStore.open(f"http://127.0.0.1:{server.server_address[1]}")
+    with served(tmp_path) as url:
+        store = PemStore.open(url)
         np.testing.assert_array_equal(
             store.read_map("lid", "distant", 1), PemStore.open(tmp_path).read_map("lid", "distant", 1)
         )
-        server.shutdown()
 
 
 def test_the_fingerprint_follows_contents_and_not_places() -> None:

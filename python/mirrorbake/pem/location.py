@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import fcntl
 import os
@@ -18,7 +19,7 @@ from mirrorbake.errors import InputError, StoreError
 from mirrorbake.files import atomic_output
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from zarr.abc.store import Store
 
@@ -163,6 +164,19 @@ def list_keys(store: Store, prefix: str) -> list[str]:
         return [key async for key in store.list_prefix(prefix)]
 
     return sync(collect())
+
+
+def keys_there(store: Store, prefix: str, keys: Sequence[str]) -> list[bool]:
+    """Which of some keys, which all start with `prefix`, a store has objects of."""
+    listed = set(list_keys(store, prefix))
+    if listed or isinstance(store, zarr.storage.LocalStore):
+        return [key in listed for key in keys]
+
+    async def ask() -> list[bool]:
+        return await asyncio.gather(*(store.exists(key) for key in keys))
+
+    # A web server lists nothing: it is asked for each.
+    return sync(ask())
 
 
 def delete_key(store: Store, key: str) -> None:

@@ -24,7 +24,6 @@ holds the rest; `mirrorbake.pem.schema` says what.
 from __future__ import annotations
 
 import contextlib
-import re
 import shutil
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +51,7 @@ from mirrorbake.pem.location import (
     delete_key,
     exclusive,
     has_key,
-    list_keys,
+    keys_there,
     rename_unless_there,
     stored_bytes,
 )
@@ -208,12 +207,8 @@ class PemStore:
 
     def completed(self) -> NDArray[np.bool_]:
         """Which samples are there, shape (N,)."""
-        done = np.zeros(len(self.header.space), bool)
-        for key in list_keys(self._group.store, "record/c/"):
-            match = re.fullmatch(r"record/c/(\d{1,18})/0", key)
-            if match is not None and int(match[1]) < len(done):
-                done[int(match[1])] = True
-        return done
+        names = [f"record/c/{index}/0" for index in range(len(self.header.space))]
+        return np.array(keys_there(self._group.store, "record/c/", names), bool)
 
     def require_complete(self) -> None:
         """Raise StoreError unless every sample is there."""
@@ -368,6 +363,10 @@ class PemStore:
         if self._has("diffuse/irradiance") and self.has_irradiance_per_sample:
             names.append("diffuse/irradiance")
         return sum(stored_bytes(self._group.store, _key(self._array(name), name, index)) for name in names)
+
+    def map_bytes(self, index: int) -> int:
+        """Bytes that a sample's maps take."""
+        return stored_bytes(self._group.store, _key(self._array("maps"), "maps", index))
 
     def check_mesh(self, vertices: int, triangles: int) -> None:
         """Raise StoreError unless what is stored of the mesh is for so many vertices and triangles."""

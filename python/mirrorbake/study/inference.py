@@ -133,21 +133,25 @@ class Lab:
     def reference(self, place: Place) -> FloatArray:
         """Return mean radiance of the object and coverage, (H, W, 4), traced apart from the targets."""
         if place not in self._references:
-            camera = self.camera(place)
-            sums = np.zeros((camera.height * camera.width, 4))
-            for y, samples in self._traced(place, self.reference_samples, _REFERENCE_SEED):
-                pixel = np.asarray(samples.pixel).astype(np.int64) + y * camera.width
-                local, distant = (np.asarray(shell.radiance) for shell in samples.shells)
-                light = np.asarray(samples.diffuse) + np.asarray(samples.fresnel) * (
-                    local[:, :3] + (1.0 - local[:, 3:]) * distant[:, :3]
-                )
-                for channel in range(3):
-                    sums[:, channel] += np.bincount(pixel, light[:, channel], len(sums))
-                sums[:, 3] += np.bincount(pixel, minlength=len(sums))
-            sums[:, :3] /= np.maximum(sums[:, 3:], 1.0)
-            sums[:, 3] /= self.reference_samples
-            self._references[place] = sums.reshape(camera.height, camera.width, 4).astype(np.float32)
+            self._references[place] = self.picture(place, self.reference_samples, _REFERENCE_SEED)
         return self._references[place]
+
+    def picture(self, place: Place, samples: int, seed: int) -> FloatArray:
+        """Trace a view: mean radiance of the object and coverage, (H, W, 4)."""
+        camera = self.camera(place)
+        sums = np.zeros((camera.height * camera.width, 4))
+        for y, traced in self._traced(place, samples, seed):
+            pixel = np.asarray(traced.pixel).astype(np.int64) + y * camera.width
+            local, distant = (np.asarray(shell.radiance) for shell in traced.shells)
+            light = np.asarray(traced.diffuse) + np.asarray(traced.fresnel) * (
+                local[:, :3] + (1.0 - local[:, 3:]) * distant[:, :3]
+            )
+            for channel in range(3):
+                sums[:, channel] += np.bincount(pixel, light[:, channel], len(sums))
+            sums[:, 3] += np.bincount(pixel, minlength=len(sums))
+        sums[:, :3] /= np.maximum(sums[:, 3:], 1.0)
+        sums[:, 3] /= samples
+        return sums.reshape(camera.height, camera.width, 4).astype(np.float32)
 
     def lookups(self, place: Place, run_time: _core.RunTimeModel) -> _core.SurfaceSamples:
         """Return where a run time's lookups meet the object."""

@@ -207,16 +207,18 @@ class EnvMap:
         return block.reshape((self.layout.faces, *shape) if self.layout.faces > 1 else shape)
 
     def half(self) -> tuple[NDArray[np.float16], int]:
-        """Return the block in half the memory, and how many values were clamped to ±65504.
+        """Return the map in half the memory, and how many values were clamped to ±65504.
 
-        `from_array` takes a level of it back, exactly.
+        What `from_array` takes back, exactly; of a map with several levels all of them, one after the other.
 
-        >>> values, clamped = EnvMap.from_array(np.full((1, 2, 1), 1e6, np.float32), "latlong").half()
-        >>> values.tolist(), clamped
+        >>> bright = EnvMap.from_array(np.full((1, 2, 1), 1e6, np.float32), "latlong")
+        >>> values, clamped = bright.half()
+        >>> EnvMap.from_array(values, "latlong").values.tolist(), clamped
         ([65504.0, 65504.0], 2)
         """
         bits, clamped = _core.half_from_float(self.layout, self.values)
-        return bits.view(np.float16), clamped
+        values = bits.view(np.float16)
+        return (values.reshape(self.level().shape) if self.levels == 1 else values), clamped
 
     def resample(
         self,

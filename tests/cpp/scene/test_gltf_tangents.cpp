@@ -110,6 +110,15 @@ TEST_F(GltfTangents, NodesTurnThemAndMirrorsTurnTheSign) {
   }
 }
 
+// Flat to a node, however large it makes what is not there: no number overflows into the mesh.
+TEST_F(GltfTangents, OnesThatANodeMakesTooLargeAreDerived) {
+  tangents = everywhere({0.0F, 0.0F, 1.0F, 1.0F});
+  node = R"({"mesh":0,"scale":[1,1,1e200]})";
+  const TriangleMesh mesh = loaded_mesh();
+  EXPECT_NO_THROW(validate(mesh));
+  for (const glm::vec4 t : mesh.tangents) EXPECT_EQ(std::abs(t.x), 1.0F);
+}
+
 TEST_F(GltfTangents, WithoutNormalsThoseOfTheFileAreIgnored) {  // glTF 2.0 §3.7.2.1, a MUST
   tangents = everywhere({0.6F, 0.8F, 0.0F, -1.0F});
   has_normals = false;

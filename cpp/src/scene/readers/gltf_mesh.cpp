@@ -166,7 +166,7 @@ class GltfBuilder {
   static glm::vec4 turned_tangent(glm::vec4 tangent, const glm::dmat3& world_from_node, bool is_mirrored) {
     const glm::dvec3 turned = world_from_node * glm::dvec3(tangent);
     const double length = glm::length(turned);
-    if (!(length > 0.0)) return glm::vec4(0.0F);
+    if (!(length > 0.0) || !std::isfinite(length)) return glm::vec4(0.0F);
     return {glm::vec3(turned / length), is_mirrored ? -tangent.w : tangent.w};
   }
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mirrorbake import _core
 from mirrorbake.errors import OptionError
-from mirrorbake.evaluate.contenders import RUN_TIMES, TITLES
+from mirrorbake.evaluate.contenders import MAIN_RUN_TIME, RUN_TIMES, TITLES
 from mirrorbake.evaluate.evaluate import Evaluation, SeenView, evaluate, finite
 from mirrorbake.evaluate.metrics import mean_or_none
 from mirrorbake.evaluate.places import PLACE_TITLES
@@ -22,7 +22,7 @@ from mirrorbake.pem.location import Location, bytes_under
 from mirrorbake.pem.store import PemStore
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
     from mirrorbake.bake.bake import ProgressReport
@@ -83,12 +83,15 @@ def report(
 
     evaluation = evaluate(location, progress, stage, on_view=keep)
     store = PemStore.open(location)
+    # That which the maps were inferred for, and which pictures are drawn by, comes first.
+    own = next((seen.run_time for seen in pictured.values()), MAIN_RUN_TIME)
+    run_times = sorted(RUN_TIMES, key=lambda name: name != own)
     parts = [
-        _head(store, evaluation),
-        _table(evaluation),
-        _curves(evaluation),
+        _head(store, evaluation, own),
+        _table(evaluation, run_times),
+        _curves(evaluation, run_times),
         _pictures(pictured),
-        _metrics(evaluation),
+        _metrics(evaluation, run_times),
         *(section(location.path) for section in sections if not location.is_remote),
         _plan(store),
         _cost(store, evaluation),
@@ -115,12 +118,12 @@ def _name(store: PemStore) -> str:
     return str(name).replace("\\", "/").rsplit("/", 1)[-1]
 
 
-def _head(store: PemStore, evaluation: Evaluation) -> str:
+def _head(store: PemStore, evaluation: Evaluation, run_time: str) -> str:
     header, views = store.header, store.header.source.config["views"]
     width, height = header.image_size
     lines = [
         f"<h1>{html.escape(_name(store))}</h1>",
-        f'<p class="lead">{html.escape(verdict(evaluation))}</p>',
+        f'<p class="lead">{html.escape(verdict(evaluation, run_time))}</p>',
     ]
     count = len(header.space)
     lines.append(
@@ -131,23 +134,27 @@ def _head(store: PemStore, evaluation: Evaluation) -> str:
     return "\n".join(lines)
 
 
-def verdict(evaluation: Evaluation) -> str:
-    """One or two sentences on what the figures say."""
+def verdict(evaluation: Evaluation, run_time: str) -> str:
+    """One or two sentences on what the figures of a run time say."""
+
+    def mean(contender: str, place: str) -> float | None:
+        return evaluation.mean(contender, place, run_time=run_time)
+
     names = present(evaluation)
     static = [name for name in names if name.startswith("static")]
-    on, between = (evaluation.mean("pem", place) for place in ("on", "between"))
+    on, between = (mean("pem", place) for place in ("on", "between"))
     if on is None or not static:
         return "The object covers no pixel of the evaluated views wholly: there is nothing to measure."
-    best = max(static, key=lambda name: evaluation.mean(name, "on") or -math.inf)
-    there = evaluation.mean(best, "on")
+    best = max(static, key=lambda name: mean(name, "on") or -math.inf)
+    there = mean(best, "on")
     assert there is not None
     words = f"The PEM agrees with ray tracing to {on:.1f} dB on its samples"
     words += "" if between is None else f" and {between:.1f} dB between them"
-    words += f"; the best static map ({_lowered(TITLES[best])}) to {there:.1f} dB."
+    words += f"; the best static map ({_lowered(TITLES[best])}) to {there:.1f} dB. Run time: {run_time}."
     worse = [
         place
         for place in evaluation.places
-        if (evaluation.mean("pem", place) or math.inf) < (evaluation.mean(best, place) or -math.inf)
+        if (mean("pem", place) or math.inf) < (mean(best, place) or -math.inf)
     ]
     if on < there + 1.0:
         words += " That is no lead worth the bytes of a PEM: the static map does as well here."
@@ -170,10 +177,10 @@ def _cell(words: str, kind: str = "") -> str:
     return f'<td class="{kind}">{html.escape(words)}</td>' if kind else f"<td>{html.escape(words)}</td>"
 
 
-def _table(evaluation: Evaluation) -> str:
+def _table(evaluation: Evaluation, run_times: Sequence[str]) -> str:
     names = present(evaluation)
     parts = ["<h2>Against ray tracing</h2>", f'<p class="soft">{html.escape(_YARDSTICK)}</p>']
-    for run_time in RUN_TIMES:
+    for run_time in run_times:
         rows = []
         for place in evaluation.places:
             views = [view for view in evaluation.views if view.place == place]
@@ -189,7 +196,7 @@ def _table(evaluation: Evaluation) -> str:
                 [_cell(PLACE_TITLES[place]), _cell(f"{degrees:.3g}°"), *cells, _cell(number(ceiling, 1))]
             )
         heading = ["PSNR, dB", "from a sample", *(TITLES[name] for name in names), "ceiling"]
-        if len(RUN_TIMES) > 1:
+        if len(run_times) > 1:
             parts.append(f"<h3>Run time {run_time}</h3>")
         parts.append(_rows(heading, rows))
     return "\n".join(parts)
@@ -202,14 +209,14 @@ _YARDSTICK = (
 )
 
 
-def _curves(evaluation: Evaluation) -> str:
+def _curves(evaluation: Evaluation, run_times: Sequence[str]) -> str:
     names = present(evaluation)
     along = [view for view in evaluation.views if view.place in _ALONG]
     others = [view for view in evaluation.views if view.place not in _ALONG]
     if len(along) < 2:
         return ""
     parts = ["<h2>Error against angle</h2>"]
-    for run_time in RUN_TIMES:
+    for run_time in run_times:
         values = [
             value
             for view in evaluation.views
@@ -290,7 +297,7 @@ def _card(seen: SeenView) -> str:
     )
 
 
-def _metrics(evaluation: Evaluation) -> str:
+def _metrics(evaluation: Evaluation, run_times: Sequence[str]) -> str:
     rows = [
         [
             _cell(PLACE_TITLES[place]),
@@ -301,7 +308,7 @@ def _metrics(evaluation: Evaluation) -> str:
             ),
         ]
         for place in evaluation.places
-        for run_time in RUN_TIMES
+        for run_time in run_times
     ]
     words = (
         "SSIM: 1 is best. FLIP: 0 is best. Worst 1 %: RMS error of those pixels, in display values. Sliding: "

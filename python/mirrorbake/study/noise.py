@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+
+    DoubleArray = NDArray[np.float64]
+
+Indirect: TypeAlias = Literal["none", "cached", "path"]
 
 SIDE = 256
 """Pixels."""
@@ -52,6 +56,7 @@ class View:
 
     def __init__(self, object_file: str | None = None, sky: str | None = None, side: int = SIDE) -> None:
         self._side = side
+        self._tracers: dict[Indirect, _core.Tracer] = {}
         views = {"kind": "fixed", "size": [side, side], "fov": FIELD_OF_VIEW}
         scene: dict[str, object] = {"views": views}
         if object_file is not None:
@@ -84,6 +89,23 @@ class View:
         picture = np.stack(sums, axis=-1).reshape(side, side, 3) / np.maximum(hits, 1)[..., None]
         return picture.astype(np.float32), whole, float(taken[whole].mean())
 
+    def blocks(self, indirect: Indirect, samples: int, seed: int) -> tuple[DoubleArray, DoubleArray]:
+        """Sums of the object's light over blocks, mean of the channels, and numbers of samples on it."""
+        if indirect not in self._tracers:
+            self._tracers[indirect] = _core.Tracer(
+                self._stage.built.scene, _core.TracerOptions(indirect=indirect)
+            )
+        options = _core.TraceOptions(
+            samples_per_pixel=samples, max_specular_depth=8, max_diffuse_depth=16, seed=seed
+        )
+        traced = self._tracers[indirect].trace_layers(self._camera, self._stage.built.reflector, options)
+        pixel, light = np.asarray(traced.samples.pixel), np.asarray(traced.sample_beauty).mean(axis=1)
+        across = self._side // BLOCK
+        block = pixel // self._side // BLOCK * across + pixel % self._side // BLOCK
+        return np.bincount(block, light, across**2).astype(float), np.bincount(
+            block, minlength=across**2
+        ).astype(float)
+
     def agreement(self, first: int, second: int, noise: float = 0.0) -> Agreement:
         """Trace the view twice, from other random numbers."""
         one, covered, _ = self.trace(first, 101, noise)
@@ -93,12 +115,57 @@ class View:
         return Agreement((first, second), noise, spent, psnr(one, other, covered & also), seconds)
 
 
+BIAS_SIDE, BLOCK, BIAS_SEEDS = 64, 8, 4
+"""Pixels of a picture, and of a block; and pictures whose scatter tells the error of their mean."""
+
+
+def bias(samples: int) -> dict[Indirect, tuple[float, float, float]]:
+    """Compare light that is cached, or none, with paths: the teapot's view in blocks.
+
+    All take the same random numbers, so that what they share cancels.
+
+    Parameters
+    ----------
+    samples
+        Per pixel, of each of `BIAS_SEEDS` pictures.
+
+    Returns
+    -------
+        By `trace.indirect`: mean difference, that of the worst block, and its standard error at most, as
+        shares of the mean radiance. Blocks count that the object covers by a quarter.
+    """
+    view = View(side=BIAS_SIDE)
+    paths = [view.blocks("path", samples, seed) for seed in range(BIAS_SEEDS)]
+    hits = np.sum([count for _, count in paths], axis=0)
+    kept = hits > 0.25 * hits.max()
+    whole = np.mean([light[kept] / count[kept] for light, count in paths], axis=0)
+    found: dict[Indirect, tuple[float, float, float]] = {}
+    modes: tuple[Indirect, ...] = ("cached", "none")
+    for mode in modes:
+        others = [view.blocks(mode, samples, seed) for seed in range(BIAS_SEEDS)]
+        off = np.array(
+            [
+                (a[kept] / m[kept] - b[kept] / n[kept]) / whole.mean()
+                for (a, m), (b, n) in zip(others, paths, strict=True)
+            ]
+        )
+        mean = off.mean(axis=0)
+        error = off.std(axis=0, ddof=1) / BIAS_SEEDS**0.5
+        found[mode] = (float(mean.mean()), float(mean[np.abs(mean).argmax()]), float(error.max()))
+    return found
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(prog="python -m mirrorbake.study.noise", description=__doc__)
     parser.add_argument("--object", help="an .obj, .gltf or .glb file instead of the teapot")
     parser.add_argument("--sky", help="a panorama instead of the room")
+    parser.add_argument("--bias", action="store_true", help="of cached light against paths, in blocks")
     options = parser.parse_args(arguments)
+    if options.bias:
+        for mode, (mean, worst, error) in bias(64).items():
+            print(f"{mode}: {mean:+.1%} in the mean, {worst:+.1%} in the worst block, ±{error:.1%} at most")
+        return
     view = View(options.object, options.sky)
     print("| samples | against | noise allowed | spent | agree to | processor seconds |")
     print("| --- | --- | --- | --- | --- | --- |")

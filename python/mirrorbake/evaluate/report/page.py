@@ -244,6 +244,8 @@ def _curves(evaluation: Evaluation, run_times: Sequence[str]) -> str:
                         style = f'style="fill:{fill};stroke:{colour(name)}" stroke-width="1.5"'
                         words = f"{TITLES[name]}, {PLACE_TITLES[view.place]}: {value:.1f} dB"
                         plot.point(view.degrees, value, style, words)
+        if len(run_times) > 1:
+            parts.append(f"<h3>Run time {run_time}</h3>")
         parts += [f'<div class="scroll">{plot.svg()}</div>', legend(names)]
     parts.append('<p class="soft">Lines: along the arc and past its end. Hollow: above and below it.</p>')
     return "\n".join(parts)

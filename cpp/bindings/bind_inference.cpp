@@ -68,8 +68,8 @@ the six faces (+X -X +Y -Y +Z -Z), in a face the rows from the top.)")
 faces: float32 (6, N, N, C). Returns float32 (texels, C): every level is the mean of the finer one's 2x2
 texels weighted by their solid angles ([EMT] section 2.4).)");
 
-  nb::class_<MapProjection>(m, "MapProjection", "A projection in which the maps of a PEM can be kept.")
-      .def_prop_ro(
+  nb::class_<MapProjection> kept(m, "MapProjection", "A projection in which the maps of a PEM can be kept.");
+  kept.def_prop_ro(
           "name", [](const MapProjection& p) { return std::string(p.name); }, "In scene files and in PEMs.")
       .def_prop_ro(
           "projection", [](const MapProjection& p) { return to_string({.kind = p.projection}); },
@@ -79,6 +79,7 @@ texels weighted by their solid angles ([EMT] section 2.4).)");
       .def_prop_ro(
           "order", [](const MapProjection& p) { return std::string(p.order); },
           "Of the faces, and of their texels, in words.");
+  show(kept, {"name", "projection", "faces"});
   m.def(
       "map_projections",
       [] {
@@ -108,6 +109,12 @@ values of an EnvMap are: levels from the finest, in a level the faces, in a face
       .def("level_offset", &TexelTopology::level_offset, nb::arg("level"), "Index of a level's first texel.")
       .def("width", &TexelTopology::width, nb::arg("level") = 0, "Texels of a face of a level.")
       .def("height", &TexelTopology::height, nb::arg("level") = 0, "Texels of a face of a level.")
+      .def("__repr__",
+           [](const TexelTopology& self) {
+             return "TexelTopology(faces=" + std::to_string(self.faces()) +
+                    ", width=" + std::to_string(self.width(0)) +
+                    ", height=" + std::to_string(self.height(0)) + ")";
+           })
       .def(
           "__eq__", [](const TexelTopology& a, const TexelTopology& b) { return a == b; }, nb::is_operator(),
           nb::sig("def __eq__(self, other: object, /) -> bool"));

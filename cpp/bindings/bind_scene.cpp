@@ -66,6 +66,15 @@ void bind_visibility(nb::module_& m) {
       .value("all", Visibility::all);
 }
 
+std::string in_words(const Scene& scene) {
+  const std::size_t lights = scene.rectangle_lights.size() + scene.sphere_lights.size() +
+                             scene.point_lights.size() + scene.directional_lights.size() +
+                             scene.spot_lights.size();
+  return "objects=" + std::to_string(scene.objects.size()) +
+         ", materials=" + std::to_string(scene.materials.size()) + ", lights=" + std::to_string(lights) +
+         ", environment=" + (scene.environment ? "True" : "False");
+}
+
 void bind_loaded_scene(nb::module_& m) {
   nb::class_<SceneCamera>(m, "SceneCamera", "A viewpoint that a scene file proposes.")
       .def_ro("name", &SceneCamera::name)
@@ -83,7 +92,12 @@ void bind_loaded_scene(nb::module_& m) {
   nb::class_<LoadedScene>(m, "LoadedScene", "What a scene file holds.")
       .def_ro("scene", &LoadedScene::scene)
       .def_prop_ro("cameras", [](const LoadedScene& loaded) { return loaded.cameras; })
-      .def_prop_ro("warnings", [](const LoadedScene& loaded) { return loaded.warnings; });
+      .def_prop_ro("warnings", [](const LoadedScene& loaded) { return loaded.warnings; })
+      .def("__repr__", [](const LoadedScene& loaded) {
+        return "LoadedScene(" + in_words(loaded.scene) +
+               ", cameras=" + std::to_string(loaded.cameras.size()) +
+               ", warnings=" + std::to_string(loaded.warnings.size()) + ")";
+      });
   m.def(
       "load_scene",
       [](const PathText& path, int max_texture_side, std::uint64_t max_texture_bytes,
@@ -288,6 +302,7 @@ void bind_scene_class(nb::module_& m) {
       R"(Objects, materials, textures and lights. World space is right-handed, +Y up, in metres; colours
 and radiance are scene-linear with Rec.709 primaries. The add_ functions return the new thing's index.)");
   scene_type.def(nb::init<>())
+      .def("__repr__", [](const Scene& scene) { return "Scene(" + in_words(scene) + ")"; })
       .def(
           "translate",
           [](Scene& scene, std::array<double, 3> by) {

@@ -141,6 +141,10 @@ void bind_run_time(nb::module_& m) {
               "Size of a lookup's footprint in pixels, in (0, 1024].")
       .def_ro("filter", &RunTimeModel::filter)
       .def_ro("max_taps", &RunTimeModel::max_taps, "Of `anisotropic`: 1, or an even number up to 16.")
+      .def("__repr__",
+           [](const RunTimeModel& self) {
+             return "RunTimeModel('" + self.name + "', lookups=" + std::to_string(self.places.size()) + ")";
+           })
       .def(
           "__eq__", [](const RunTimeModel& a, const RunTimeModel& b) { return a == b; }, nb::is_operator(),
           nb::sig("def __eq__(self, other: object, /) -> bool"));

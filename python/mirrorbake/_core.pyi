@@ -706,6 +706,8 @@ class Scene:
 
     def __init__(self) -> None: ...
 
+    def __repr__(self) -> str: ...
+
     def translate(self, by: Sequence[float]) -> None:
         """
         Move everything that has a place: objects, and lights that are not at infinity.
@@ -867,6 +869,8 @@ class LoadedScene:
 
     @property
     def warnings(self) -> list[SceneWarning]: ...
+
+    def __repr__(self) -> str: ...
 
 def load_scene(path: str | os.PathLike[str], *, max_texture_side: int = 16384, max_texture_bytes: int = 4294967296, cache_textures_above: int = 67108864, max_vertices: int = 50000000, max_triangles: int = 50000000, luminous_efficacy: float = 1.0, origin: Sequence[float] = [0.0, 0.0, 0.0]) -> LoadedScene:
     """
@@ -1044,6 +1048,8 @@ class RunTimeModel:
     @property
     def max_taps(self) -> int:
         """Of `anisotropic`: 1, or an even number up to 16."""
+
+    def __repr__(self) -> str: ...
 
     def __eq__(self, other: object, /) -> bool: ...
 
@@ -1673,6 +1679,8 @@ class MapProjection:
     def order(self) -> str:
         """Of the faces, and of their texels, in words."""
 
+    def __repr__(self) -> str: ...
+
 def map_projections() -> dict[str, MapProjection]:
     """
     The projections in which the maps of a PEM can be kept, by the names that scene files have for them.
@@ -1720,6 +1728,8 @@ class TexelTopology:
 
     def height(self, level: int = 0) -> int:
         """Texels of a face of a level."""
+
+    def __repr__(self) -> str: ...
 
     def __eq__(self, other: object, /) -> bool: ...
 

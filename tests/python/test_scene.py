@@ -253,3 +253,13 @@ def test_paths_may_be_of_pathlib(tmp_path: Path) -> None:
     assert len(_core.load_mesh(path).triangles) == len(_core.load_mesh(str(path)).triangles) == 1
     with pytest.raises(TypeError):
         _core.load_mesh(7)  # type: ignore[arg-type]
+
+
+def test_what_is_printed_says_what_it_is() -> None:
+    scene = _core.Scene()
+    material = scene.add_material(_core.Material())
+    scene.add_object("ball", _core.make_sphere((0, 0, 0), 1.0, 8), material)
+    scene.add_point_light((0, 3, 0), (1, 1, 1))
+    assert repr(scene) == "Scene(objects=1, materials=1, lights=1, environment=False)"
+    assert repr(_core.TexelTopology.cube(8)) == "TexelTopology(faces=6, width=8, height=8)"
+    assert repr(_core.run_time_model("Web1")) == "RunTimeModel('Web1', lookups=1)"

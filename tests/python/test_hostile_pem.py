@@ -11,9 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from mirrorbake.bake.bake import bake
-from mirrorbake.commands.errors import EXIT_INPUT
 from mirrorbake.commands.main import app
-from mirrorbake.errors import InputError
+from mirrorbake.errors import EXIT_INPUT, InputError
 from mirrorbake.pem.export.map_sets import sample_set
 from mirrorbake.pem.export.maps import export_maps
 from mirrorbake.pem.export.source import export_source

@@ -95,6 +95,16 @@ def test_a_renderer_is_given_the_window_that_it_has_to_draw(analytic: Path) -> N
     np.testing.assert_array_equal(software(part)(maps), software(whole)(maps)[:, 24:40, 16:48])
 
 
+def test_pictures_that_do_not_depend_on_the_maps_are_an_error(tmp_path: Path) -> None:
+    def deaf(view: MapsView) -> Draw:
+        draw = software(view)
+        return lambda maps: np.ones_like(draw(maps))
+
+    register_renderer("deaf", deaf)
+    with pytest.raises(_core.InvalidArgument, match="the same for all maps"):
+        baked(tmp_path / "pem", {"matrix": "probed", "renderer": "deaf"})
+
+
 def test_an_unknown_renderer_is_named_before_anything_is_written(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match=r"infer\.renderer = 'nobody': expected one of .*software"):
         baked(tmp_path / "pem", {"matrix": "probed", "renderer": "nobody"})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -47,3 +49,22 @@ def test_a_dome_is_looked_at_inside(tmp_path: Path) -> None:
     assert [look.place for look in looks] == ["inside"] * INSIDE
     assert all(look.static_set is None for look in looks)
     assert all(look.noise > 10.0 for look in looks)
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "status", "words"),
+    [
+        ("reach", ["missing.toml"], 3, "missing.toml: No such file"),
+        ("reach", ["missing.toml", "--set", "nonsense"], 2, "nonsense"),
+        ("noise", ["--object", "missing.obj"], 3, "missing.obj"),
+        ("noise", ["--bias", "--object", "missing.obj"], 2, "--bias is measured of the teapot"),
+    ],
+)
+def test_bad_input_of_a_measurement_is_one_line(
+    module: str, arguments: list[str], status: int, words: str
+) -> None:
+    program = f"mirrorbake.study.{module}"
+    ended = subprocess.run([sys.executable, "-m", program, *arguments], capture_output=True, text=True)
+    assert ended.returncode == status
+    assert words in ended.stderr.splitlines()[-1]
+    assert "Traceback" not in ended.stderr

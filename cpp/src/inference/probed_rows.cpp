@@ -51,6 +51,12 @@ ProbedView::ProbedView(const FitModel& model, const DisplayView& view, const Pro
     rows += maps_.back().matrix.rows();
     missing += maps_.back().missing.size();
   }
+  // A silhouette that few lookups meet may be nowhere in the renderer's pictures.
+  constexpr std::size_t kSurelySeen = 64;
+  if (rows + missing == 0 && view.lookups->pixel.size() >= kSurelySeen) {
+    throw InvalidArgument("render", "a renderer whose pictures are the same for all maps",
+                          "the object, drawn from the maps that it is given");
+  }
   if (missing > rows) {
     throw InvalidArgument("render",
                           "a renderer of which " + std::to_string(missing) + " of " +

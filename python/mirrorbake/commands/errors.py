@@ -9,16 +9,10 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import typer
 from typer.core import TyperGroup
 
-from mirrorbake import _core
-from mirrorbake.errors import InputError, OptionError
+from mirrorbake.errors import EXIT_INTERRUPTED, EXIT_USAGE, answer_to
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-
-EXIT_USAGE = 2
-EXIT_INPUT = 3
-EXIT_NUMERICAL = 4
-EXIT_INTERRUPTED = 130
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -40,16 +34,11 @@ def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             return command(*args, **kwargs)
-        except OptionError as failure:
-            raise _fail(str(failure), EXIT_USAGE) from None
-        except (InputError, _core.InvalidArgument, _core.MissingLibrary, OSError) as failure:
-            raise _fail(str(failure), EXIT_INPUT) from None
-        except MemoryError:
-            raise _fail("not enough memory for images and maps of this size", EXIT_INPUT) from None
-        except ArithmeticError as failure:
-            raise _fail(str(failure), EXIT_NUMERICAL) from None
-        except KeyboardInterrupt:
-            raise _fail("interrupted", EXIT_INTERRUPTED) from None
+        except BaseException as failure:
+            answer = answer_to(failure)
+            if answer is None:
+                raise
+            raise _fail(*answer) from None
 
     return wrapped
 

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from mirrorbake import _core
+from mirrorbake.errors import one_line_errors
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.study.inference import NEIGHBOUR_WEIGHT, OPTIONS, PLACES, Lab
@@ -162,4 +163,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_line_errors("python -m mirrorbake.study.alpha"):
+        main()

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.errors import one_line_errors
 from mirrorbake.evaluate.metrics import psnr
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import prepare_stage
@@ -162,6 +163,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--sky", help="a panorama instead of the room")
     parser.add_argument("--bias", action="store_true", help="of cached light against paths, in blocks")
     options = parser.parse_args(arguments)
+    if options.bias and (options.object or options.sky):
+        parser.error("--bias is measured of the teapot in its room, without --object and --sky")
     if options.bias:
         for mode, (mean, worst, error) in bias(64).items():
             print(f"{mode}: {mean:+.1%} in the mean, {worst:+.1%} in the worst block, ±{error:.1%} at most")
@@ -186,4 +189,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_line_errors("python -m mirrorbake.study.noise"):
+        main()

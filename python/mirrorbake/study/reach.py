@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake.bake.bake import bake
+from mirrorbake.errors import one_line_errors
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.scene.load import load_config, parse_override
 from mirrorbake.scene.stage import prepare_stage
@@ -158,11 +159,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("scenes", nargs="+", metavar="SCENE.toml")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="assignments")
     options = parser.parse_args(arguments)
+    overrides = [parse_override(text) for text in options.assignments]
+    scenes = {name: load_config(Path(name), overrides) for name in options.scenes}
     print("| scene | place | PEM | static set | captured at infinity | lead | 16 samples' noise |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
-    for name in options.scenes:
+    for name, config in scenes.items():
         start = time.process_time()
-        config = load_config(Path(name), [parse_override(text) for text in options.assignments])
         with tempfile.TemporaryDirectory() as folder:
             for look in measured(config, Path(folder) / "pem"):
                 static = "" if look.static_set is None else f"{look.static_set:.1f}"
@@ -176,4 +178,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_line_errors("python -m mirrorbake.study.reach"):
+        main()

@@ -81,6 +81,12 @@ std::uint32_t TexelTopology::texel_at(const TexelPlace& place) const {
 
 std::array<std::uint32_t, 4> TexelTopology::neighbours(std::uint32_t texel) const {
   const TexelPlace p = place(texel);
+  const int w = width(p.level);
+  const int h = height(p.level);
+  if (p.row > 0 && p.row + 1 < h && p.column > 0 && p.column + 1 < w) {
+    const auto line = static_cast<std::uint32_t>(w);
+    return {texel - line, texel + line, texel - 1, texel + 1};
+  }
   const std::array<TexelPlace, 4> around{TexelPlace{p.level, p.face, p.row - 1, p.column},
                                          {p.level, p.face, p.row + 1, p.column},
                                          {p.level, p.face, p.row, p.column - 1},
@@ -88,7 +94,7 @@ std::array<std::uint32_t, 4> TexelTopology::neighbours(std::uint32_t texel) cons
   std::array<std::uint32_t, 4> result;
   for (std::size_t i = 0; i < 4; ++i) {
     const TexelPlace& q = around[i];
-    const bool inside = q.row >= 0 && q.column >= 0 && q.row < height(p.level) && q.column < width(p.level);
+    const bool inside = q.row >= 0 && q.column >= 0 && q.row < h && q.column < w;
     result[i] = inside || beyond_edges() == BeyondEdges::neighbour ? texel_at(q) : kNoTexel;
   }
   return result;

@@ -216,7 +216,12 @@ DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPa
       weigh(views[v], pixels[v], layers[v], blend(light, model, views[v].nodes, 3), options, joint[v]);
       wanted.push_back({joint[v].target, joint[v].weights});
     }
-    MapSolution solution = solver.solve({.channels = 3, .views = wanted, .prior = prior, .initial = light});
+    const bool last = pass + 1 == options.passes;
+    MapSolution solution = solver.solve({.channels = 3,
+                                         .views = wanted,
+                                         .prior = prior,
+                                         .initial = light,
+                                         .unseen = last ? UnseenTexels::filled : UnseenTexels::as_before});
     light = std::move(solution.texels);
     fit.passes.push_back(solution.report);
   }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "banded_rows.hpp"
 #include "mirrorbake/inference/map_solver.hpp"
 #include "regulariser.hpp"
 #include "texel_vector.hpp"
@@ -10,35 +11,18 @@
 /// The least-squares system of MapSolver, and how it is minimised within bounds.
 namespace mirrorbake {
 
-using Vector = std::vector<Channels>;
-
-/// A view's matrix transposed, its columns numbered to the texels that the view sees, so that both products
-/// gather.
-struct View {
-  const RenderingMatrix* matrix;
-  std::vector<NodeWeight> nodes;
-  std::vector<std::uint32_t> texels;  // of each column that the view sees
-  std::vector<std::uint64_t> column_offsets;
-  std::vector<std::uint32_t> rows;
-  std::vector<float> entries;
-  std::vector<std::vector<std::uint32_t>> unknowns;  // of each node, the unknown of each column
-};
-
 struct MapSolver::State {
   SolveOptions options;
   std::vector<TexelTopology> maps;
   std::size_t texels_per_node = 0;
   int nodes = 1;
-  std::vector<View> views;
+  BandedRows rows;
   std::vector<std::uint8_t> seen;     // of each texel of all nodes
   std::vector<std::uint32_t> texels;  // of each unknown, counted through all nodes
   Regulariser regulariser;
 
   std::size_t unknowns() const { return texels.size(); }
 };
-
-/// Vectors of every view's rows.
-std::vector<Vector> rows_of(const std::vector<View>& views);
 
 /// Of every unknown; the unknowns may be differences from a prior.
 struct Bounds {
@@ -48,50 +32,53 @@ struct Bounds {
 /// One solve: the operator with the rows' weights, and what it needs to work in.
 class LeastSquares {
  public:
-  LeastSquares(const MapSolver::State& state, std::vector<Vector> row_weights);
+  /// `row_weights`: of the rows of all views.
+  LeastSquares(const MapSolver::State& state, Vector row_weights);
 
-  /// b_v = A_v Σ_k weight_k x_k for every view.
-  void multiply(const Vector& x, std::vector<Vector>& b);
-
-  /// y += Σ_v (weight of the node) A_vᵀ W t_v.
-  void add_transposed(const std::vector<Vector>& t, Vector& y);
-
-  /// Σ w |t|² per channel.
-  ChannelSums weighted_squares(const std::vector<Vector>& t) const;
+  /// What each unknown's rows want of it on average.
+  Vector back_project(const Vector& target);
 
   /// Minimises Σ w |A x − target|² + scale · (regulariser + magnitude |x|²) within the bounds, starting from
   /// x.
-  SolveReport minimise(const std::vector<Vector>& target, float magnitude, const Bounds& bounds, Vector& x);
+  SolveReport minimise(const Vector& target, float magnitude, const Bounds& bounds, Vector& x);
+
+  /// Σ w |A x − target|² of the x that was found.
+  double data_squares() const { return data_squares_; }
 
  private:
-  /// What conjugate gradients carry along.
+  /// What conjugate gradients carry along. s: half the negative gradient; inverse: of the diagonal, 0 for
+  /// what is held on a bound; normal: the system's matrix times the step.
   struct Iterate {
-    std::vector<Vector> residual, step_rows;
-    Vector gx, step_gx, s, step, free, inverse;
+    Vector s, step, normal, inverse;
     ChannelSums gamma{};
   };
 
-  /// Residual and G x at x, and the sums of squares with the regulariser.
-  ChannelSums evaluate(const std::vector<Vector>& target, float magnitude, const Vector& x, Iterate& it);
+  /// Finds s at x. Returns the sums of squares with the regulariser.
+  ChannelSums evaluate(const Vector& target, float magnitude, const Vector& x, Iterate& it);
+  /// Finds the preconditioner, 0 for what the gradient holds on a bound, and the first step.
+  void begin_round(float magnitude, const Bounds* bounds, const Vector& x, Iterate& it);
   void step_once(float magnitude, Vector& x, Iterate& it);
-  ChannelSums project(const std::vector<Vector>& target, float magnitude, const Bounds& bounds,
-                      const Vector& before, const ChannelSums& squares, Vector& x, Iterate& it);
-  void add_diagonal(std::size_t view);
-  ChannelSums find_row_scale() const;
-  /// y = scale · (G + magnitude) x. Returns x·y.
-  ChannelSums regularise(const Vector& x, float magnitude, Vector& y);
-  /// s = AᵀW t − g, half the negative gradient.
-  void gradient(const std::vector<Vector>& t, const Vector& g, Vector& s);
-  /// 1 / diagonal where free is 1, else 0.
-  void find_preconditioner(float magnitude, const Vector& free, Vector& inverse) const;
-  /// s·(inverse s).
-  static ChannelSums preconditioned_squares(const Vector& inverse, const Vector& s);
+  ChannelSums project(const Vector& target, float magnitude, const Bounds& bounds, const Vector& before,
+                      const ChannelSums& squares, Vector& x, Iterate& it);
+  ChannelSums find_row_scale();
+  /// Entry i of scale · (G + magnitude) x, after `regulariser.prepare`.
+  Channels regularised(std::size_t i, float magnitude, const Vector& x) const {
+    const Channels near = broadcast(magnitude) * x[i];
+    return scale_ * (state_.regulariser.acts() ? near + state_.regulariser.at(i, x, scratch_) : near);
+  }
+  /// 1 / diagonal, 0 where that is 0.
+  Channels preconditioner(std::size_t i, float magnitude) const {
+    const Channels diagonal = diagonal_[i] + broadcast(state_.regulariser.diagonal(i) + magnitude) * scale_;
+    Channels inverse{};
+    for (std::size_t k = 0; k < 4; ++k) inverse[k] = diagonal[k] > 0.0F ? 1.0F / diagonal[k] : 0.0F;
+    return inverse;
+  }
 
   const MapSolver::State& state_;
-  std::vector<Vector> weights_;
-  Vector blended_, weighted_, diagonal_, scratch_;
+  Vector weights_, shares_, diagonal_, scratch_;
   ChannelSums row_scale_{};
   Channels scale_{};
+  double data_squares_ = 0;  // Σ w |A x − target|² where the system was evaluated last
 };
 
 }  // namespace mirrorbake

@@ -4,7 +4,9 @@ namespace mirrorbake {
 
 Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
                          std::size_t numbers, const SolveOptions& options)
-    : options_(options), links_(numbers), diagonal_(numbers) {
+    : options_(options), diagonal_(numbers) {
+  if (options.smoothness == 0.0F && options.level_agreement == 0.0F) return;
+  links_.resize(numbers);
   std::vector<std::array<std::uint32_t, 4>> children(numbers);
   for (std::size_t first = 0; first < number_of.size();) {
     for (const TexelTopology& map : maps) {
@@ -52,9 +54,9 @@ Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<
   });
 }
 
-ChannelSums Regulariser::apply(const std::vector<Channels>& x, float magnitude, Channels scale,
-                               std::vector<Channels>& scratch, std::vector<Channels>& y) const {
-  // First the disagreement of every texel with its children, times ω. Most have none: theirs stays 0.
+void Regulariser::prepare(const Vector& x, Vector& scratch) const {
+  // The disagreement of every texel with its children, times ω. Most have none: theirs stays 0.
+  if (!acts()) return;
   scratch.resize(x.size());
   parallel_for(parents_.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
@@ -65,23 +67,6 @@ ChannelSums Regulariser::apply(const std::vector<Channels>& x, float magnitude, 
       }
       scratch[parent.number] = broadcast(0.25F) * (broadcast(parent.count) * x[parent.number] - sum);
     }
-  });
-  return parallel_channel_sums(x.size(), [&](std::size_t begin, std::size_t end) {
-    ChannelDoubles sums{};
-    for (std::size_t i = begin; i < end; ++i) {
-      const Links& links = links_[i];
-      Channels difference{};
-      for (std::uint32_t neighbour : links.neighbours) {
-        if (neighbour != kNoTexel) difference += x[i] - x[neighbour];
-      }
-      Channels disagreement = scratch[i];
-      if (links.parent != kNoTexel) disagreement -= scratch[links.parent] / broadcast(links.siblings);
-      y[i] = (broadcast(options_.smoothness) * difference +
-              broadcast(options_.level_agreement) * disagreement + broadcast(magnitude) * x[i]) *
-             scale;
-      add_product(sums, x[i], y[i]);
-    }
-    return to_sums(sums);
   });
 }
 

@@ -21,9 +21,23 @@ class Regulariser {
   Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
               std::size_t numbers, const SolveOptions& options);
 
-  /// y = scale (G + magnitude · 1) x, where the form is xᵀ G x; returns x·y. `scratch` is memory to work in.
-  ChannelSums apply(const std::vector<Channels>& x, float magnitude, Channels scale,
-                    std::vector<Channels>& scratch, std::vector<Channels>& y) const;
+  /// False if the form is 0.
+  bool acts() const { return !links_.empty(); }
+
+  /// Makes `scratch` ready for `at` of the same x.
+  void prepare(const Vector& x, Vector& scratch) const;
+
+  /// Entry i of G x.
+  Channels at(std::size_t i, const Vector& x, const Vector& scratch) const {
+    const Links& links = links_[i];
+    Channels difference{};
+    for (std::uint32_t neighbour : links.neighbours) {
+      if (neighbour != kNoTexel) difference += x[i] - x[neighbour];
+    }
+    Channels disagreement = scratch[i];
+    if (links.parent != kNoTexel) disagreement -= scratch[links.parent] / broadcast(links.siblings);
+    return broadcast(options_.smoothness) * difference + broadcast(options_.level_agreement) * disagreement;
+  }
 
   /// Diagonal entry of G.
   float diagonal(std::size_t number) const { return diagonal_[number]; }

@@ -11,9 +11,14 @@ namespace mirrorbake {
 
 /// The channels of one texel or pixel, in one SIMD register; maps of fewer channels leave the rest zero.
 using Channels = float __attribute__((vector_size(16)));
+/// Of unknowns or rows.
+using Vector = std::vector<Channels>;
 using ChannelSums = std::array<double, 4>;
-/// Of sums that are being made, in SIMD registers too.
-using ChannelDoubles = double __attribute__((vector_size(32)));
+using TwoDoubles = double __attribute__((vector_size(16)));
+/// Of sums that are being made, in two SIMD registers of the least that a processor has.
+struct ChannelDoubles {
+  TwoDoubles low{}, high{};
+};
 
 inline constexpr std::size_t kVectorGrain = 8192;
 
@@ -33,10 +38,15 @@ ChannelSums parallel_channel_sums(std::size_t count, const Body& body) {
 }
 
 inline void add_product(ChannelDoubles& sums, Channels a, Channels b) {
-  sums += __builtin_convertvector(a, ChannelDoubles) * __builtin_convertvector(b, ChannelDoubles);
+  sums.low += TwoDoubles{static_cast<double>(a[0]), static_cast<double>(a[1])} *
+              TwoDoubles{static_cast<double>(b[0]), static_cast<double>(b[1])};
+  sums.high += TwoDoubles{static_cast<double>(a[2]), static_cast<double>(a[3])} *
+               TwoDoubles{static_cast<double>(b[2]), static_cast<double>(b[3])};
 }
 
-inline ChannelSums to_sums(const ChannelDoubles& sums) { return {sums[0], sums[1], sums[2], sums[3]}; }
+inline ChannelSums to_sums(const ChannelDoubles& sums) {
+  return {sums.low[0], sums.low[1], sums.high[0], sums.high[1]};
+}
 
 inline std::vector<Channels> widen(std::span<const float> values, int channels) {
   const std::size_t c = static_cast<std::size_t>(channels);

@@ -401,6 +401,34 @@ TEST(MapSolver, NodesAreFoundFromViewsOfTheirBlends) {
   EXPECT_THROW(MapSolver({&half, 1}, {&topology, 1}, 1, options), InvalidArgument);
 }
 
+// A row that reads more texels than 16 bits count, between rows that read few.
+TEST(MapSolver, SolvesRowsOfAHundredThousandTexels) {
+  const CubePyramidLayout layout = CubePyramidLayout::full(256);
+  RenderingMatrix matrix;
+  matrix.columns = layout.texels();
+  matrix.row_offsets = {0};
+  const auto add_row = [&](std::uint32_t first, std::uint32_t count) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      matrix.texels.push_back(first + i);
+      matrix.weights.push_back(1.0F / static_cast<float>(count));
+    }
+    matrix.row_offsets.push_back(matrix.texels.size());
+    matrix.row_pixels.push_back(static_cast<std::uint32_t>(matrix.row_pixels.size()));
+  };
+  add_row(0, 3);
+  add_row(100, 100000);
+  add_row(100098, 5);
+  add_row(300000, 2);
+  const std::vector<float> target{0.25F, 2.0F, 1.0F, 4.0F};
+  const std::vector<float> weights(4, 1.0F);
+  const SolveOptions free{.smoothness = 0.0F, .level_agreement = 0.0F, .prior_weight = 0.0F};
+  const MapSolution solution = solve(make_solver(matrix, layout, free), weights, target, 1);
+  EXPECT_EQ(solution.report.unknowns, 3u + 100003u + 2u);
+  const std::vector<float> shown = multiply(matrix, solution.texels, 1);
+  // 1e5 terms in float.
+  for (std::size_t r = 0; r < shown.size(); ++r) EXPECT_NEAR(shown[r], target[r], 1e-2F * target[r]) << r;
+}
+
 TEST(MapSolver, ReportsWhetherItConverged) {
   const Problem problem = make_problem(48, 4, 32);
   const std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);

@@ -74,6 +74,10 @@ struct ViewTarget {
   std::span<const float> row_weights;
 };
 
+/// What a solution has where no row sees a texel: a smooth continuation, or the prior, 0 without one, for who
+/// goes on from there with the same rows.
+enum class UnseenTexels { filled, as_before };
+
 struct SolveProblem {
   int channels = 3;  ///< 1…4
   std::span<const ViewTarget> views;
@@ -85,6 +89,7 @@ struct SolveProblem {
   std::array<float, 4> upper_bounds = {std::numeric_limits<float>::infinity(),
                                        std::numeric_limits<float>::infinity(),
                                        std::numeric_limits<float>::infinity(), 1.0F};
+  UnseenTexels unseen = UnseenTexels::filled;
 };
 
 struct MapSolution {
@@ -94,11 +99,10 @@ struct MapSolution {
 
 /// Solves min_x Σ_v Σ_r w_r |A_v,r Σₖ b_k xₖ − t_v,r|² + regulariser, within the bounds, for the maps xₖ of
 /// all nodes together; the maps of a node are stacked, as the matrix's columns are. The constructor does what
-/// all solves share: it numbers the texels that are seen, transposes the matrices and builds the
-/// regulariser's stencil.
+/// all solves share: it numbers the texels that are seen and builds the regulariser's stencil.
 ///
-/// The unknowns are the seen texels of all levels, solved for with conjugate gradients on the least-squares
-/// problem (CGLS, preconditioned with the diagonal), all channels at once. Unseen texels are filled from seen
+/// The unknowns are the seen texels of all levels, solved for with conjugate gradients, preconditioned with the
+/// diagonal, all channels at once. Unseen texels are filled from seen
 /// ones across levels (pull-push); with a prior, they fall back to it with growing distance. Same bits on any
 /// number of threads.
 class MapSolver {

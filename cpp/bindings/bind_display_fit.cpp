@@ -99,18 +99,21 @@ such pictures. None: they are analytic.)");
       .def(
           "__init__",
           [](DisplayFitOptions* self, const SolveOptions& solve, float layer_weight, float softening,
-             int passes) {
-            new (self) DisplayFitOptions{solve, layer_weight, softening, passes};
+             float over_white, int passes) {
+            new (self) DisplayFitOptions{solve, layer_weight, softening, over_white, passes};
           },
           nb::kw_only(), nb::arg("solve") = SolveOptions{},
           nb::arg("layer_weight") = DisplayFitOptions{}.layer_weight,
           nb::arg("softening") = DisplayFitOptions{}.softening,
+          nb::arg("over_white") = DisplayFitOptions{}.over_white,
           nb::arg("passes") = DisplayFitOptions{}.passes)
       .def_ro("solve", &DisplayFitOptions::solve)
       .def_ro("layer_weight", &DisplayFitOptions::layer_weight,
               "Weight of the layers' own rows beside the pixels', >= 0.")
       .def_ro("softening", &DisplayFitOptions::softening,
               "Below this radiance the derivative of the display's curve is held, in (0, 1].")
+      .def_ro("over_white", &DisplayFitOptions::over_white,
+              "Of that derivative, the share kept where target and image are over white, in (0, 1].")
       .def_ro("passes", &DisplayFitOptions::passes,
               "How often the rows' weights are taken from the model's own image, 1 to 16.");
 }

@@ -1947,7 +1947,7 @@ class DisplayView:
 class DisplayFitOptions:
     """How maps are fitted to displayed pixels."""
 
-    def __init__(self, *, solve: SolveOptions = ..., layer_weight: float = 0.029999999329447746, softening: float = 0.029999999329447746, passes: int = 2) -> None: ...
+    def __init__(self, *, solve: SolveOptions = ..., layer_weight: float = 0.029999999329447746, softening: float = 0.029999999329447746, over_white: float = 0.10000000149011612, passes: int = 2) -> None: ...
 
     @property
     def solve(self) -> SolveOptions: ...
@@ -1960,6 +1960,12 @@ class DisplayFitOptions:
     def softening(self) -> float:
         """
         Below this radiance the derivative of the display's curve is held, in (0, 1].
+        """
+
+    @property
+    def over_white(self) -> float:
+        """
+        Of that derivative, the share kept where target and image are over white, in (0, 1].
         """
 
     @property

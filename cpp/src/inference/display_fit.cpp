@@ -21,6 +21,7 @@ FitModel check(std::span<const DisplayView> views, std::span<const FitPart> part
   validate(run_time);
   check_at_least("layer_weight", static_cast<double>(options.layer_weight), 0.0);
   check_above("softening", static_cast<double>(options.softening), 0.0, 1.0);
+  check_above("over_white", static_cast<double>(options.over_white), 0.0, 1.0);
   check_range("passes", options.passes, 1, 16);
   for (std::size_t p = 0; p < parts.size(); ++p) {
     const std::string name = "parts[" + std::to_string(p) + "]";
@@ -69,6 +70,19 @@ FitModel check(std::span<const DisplayView> views, std::span<const FitPart> part
 // Derivative of the sRGB curve (IEC 61966-2-1) for radiance 1 as white, held below `softening`.
 float display_slope(float radiance, float softening) {
   return 1.055F / 2.4F * std::pow(std::max(radiance, softening), 1.0F / 2.4F - 1.0F);
+}
+
+// What a channel of a pixel is fitted to, and the derivative there.
+struct DisplayedTarget {
+  float radiance, slope;
+};
+
+// A display shows all radiance above 1 as white. A target above it asks of an image below it no more than
+// white, and of one above it little; an image above it is pulled to a target below it as from white.
+DisplayedTarget displayed_target(float image, float target, const DisplayFitOptions& options) {
+  if (target <= 1.0F) return {target, display_slope(std::min(image, 1.0F), options.softening)};
+  if (image < 1.0F) return {1.0F, display_slope(image, options.softening)};
+  return {target, options.over_white * display_slope(image, options.softening)};
 }
 
 // The layers' own fit: all four channels of all maps.
@@ -128,7 +142,7 @@ JointRows stack(const DisplayRows& pixels, const LayerRows& layers) {
   return rows;
 }
 
-// Weights at the image that `maps`, blended for the view, makes.
+// Weights and pixels' targets at the image that `maps`, blended for the view, makes.
 void weigh(const DisplayView& view, const DisplayRows& pixels, const LayerRows& layers,
            std::span<const float> maps, const DisplayFitOptions& options, JointRows& rows) {
   const std::vector<float> light = multiply(pixels.matrix, maps, 3);
@@ -139,7 +153,10 @@ void weigh(const DisplayView& view, const DisplayRows& pixels, const LayerRows& 
       const std::size_t i = 3 * r + static_cast<std::size_t>(k);
       const float f = pixels.fresnel[r][k];
       const float image = f * light[i] + pixels.diffuse[r][k];
-      const float d = display_slope(image, options.softening) * f;
+      const float own = pixels.diffuse[r][k];
+      const DisplayedTarget wanted = displayed_target(image, f * pixels.target[r][k] + own, options);
+      const float d = wanted.slope * f;
+      if (f > 0.0F) rows.target[i] = (wanted.radiance - own) / f;
       slope[pixels.matrix.row_pixels[r]][k] = display_slope(image, options.softening);
       rows.weights[i] = view.weight * pixels.coverage[r] * d * d;
     }

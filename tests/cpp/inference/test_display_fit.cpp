@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -61,7 +62,7 @@ std::vector<float> random_maps(std::uint64_t seed) {
 }
 
 // As a display shows it: the sRGB curve above its foot, where the ball's own light of 0.05 keeps all pixels.
-float shown(float radiance) { return 1.055F * std::pow(radiance, 1.0F / 2.4F) - 0.055F; }
+float shown(float radiance) { return 1.055F * std::pow(std::min(radiance, 1.0F), 1.0F / 2.4F) - 0.055F; }
 
 // Root mean square of the difference between what is drawn from the maps and the targets, as displayed.
 double display_error(const SurfaceSamples& samples, const ViewTargets& targets,
@@ -234,6 +235,30 @@ TEST(DisplayFit, ComesNearerToThePixelsThanLayersApart) {
             0.8 * display_error(samples, targets, layers.texels));
 }
 
+// Lamps of a hundred times white in every seventh of the directions, small beside what reads a texel.
+SurfaceSamples lamplit_ball() {
+  return ball(40, 4, [](const SurfaceSamples& s, std::size_t i, std::size_t k) {
+    const float lamp = std::sin(45.0F * s.position[i].x) * std::cos(35.0F * s.position[i].y) > 0.7F;
+    return k == 0 ? glm::vec4(0.0F) : glm::vec4(0.2F + 100.0F * lamp, 0.3F + 100.0F * lamp, 0.1F, 1.0F);
+  });
+}
+
+TEST(DisplayFit, SparesWhatADisplayShowsAsWhite) {
+  const SurfaceSamples samples = lamplit_ball();
+  const ViewTargets targets = targets_of(samples);
+  const DisplayView view{&samples, &targets};
+  DisplayFitOptions as_shown = precise();
+  as_shown.solve.max_iterations = 300;
+  DisplayFitOptions as_traced = as_shown;
+  as_traced.over_white = 1.0F;
+  const DisplayFit shown_fit = fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), as_shown);
+  const DisplayFit traced_fit = fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), as_traced);
+  EXPECT_LT(display_error(samples, targets, shown_fit.texels),
+            0.9 * display_error(samples, targets, traced_fit.texels));
+  // Lamps stay far brighter than white, for other exposures.
+  EXPECT_GT(*std::max_element(shown_fit.texels.begin(), shown_fit.texels.end()), 10.0F);
+}
+
 // Three views of blends of two nodes: the nodes' maps blend to what each view wants.
 TEST(DisplayFit, MapsOfNodesBlendToTheViewsBetweenThem) {
   const std::vector<float> ends[2] = {random_maps(3), random_maps(4)};
@@ -342,10 +367,13 @@ TEST(DisplayFit, RefusesWhatDoesNotFitTogether) {
   const DisplayView view{&samples, &targets};
   DisplayFitOptions never;
   never.passes = 0;
+  DisplayFitOptions blind;
+  blind.over_white = 0.0F;
   const std::vector<FitPart> unknown_map{{{kBox, 3}}, {{kBox, 0}}};
   EXPECT_THROW(fit_display({&view, 1}, unknown_map, kMaps, 1, web_run_time()), InvalidArgument);
   EXPECT_THROW(fit_display({&view, 1}, {kParts.data(), 1}, kMaps, 1, web_run_time()), InvalidArgument);
   EXPECT_THROW(fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), never), InvalidArgument);
+  EXPECT_THROW(fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), blind), InvalidArgument);
   const ViewTargets larger(9, 8, 2, 2);
   const DisplayView other{&samples, &larger};
   EXPECT_THROW(fit_display({&other, 1}, kParts, kMaps, 1, web_run_time()), InvalidArgument);

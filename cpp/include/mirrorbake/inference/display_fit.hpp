@@ -52,6 +52,9 @@ struct DisplayFitOptions {
   float layer_weight = 0.03F;
   /// Below this radiance the derivative of the display's curve is held, in (0, 1].
   float softening = 0.03F;
+  /// Of that derivative, the share that is kept where both target and image are over white, and the display
+  /// shows no difference, in (0, 1].
+  float over_white = 0.1F;
   /// How often the weights of the rows are taken from the model's own image, 1…16.
   int passes = 2;
   /// Of views that are drawn by a renderer. Within a lookup F of a coloured mirror may change channel by
@@ -77,8 +80,9 @@ struct DisplayFit {
 /// Row of a pixel: mean over its lookups of F · transmittance · reads, the transmittance Π(1 − α) of the
 /// shells in front by the α of the layers' own fit; target: the traced pixel less its diffuse light; weight:
 /// coverage times the squared derivative of the display's curve (sRGB) at the model's own image, since at a
-/// noisy target it would prefer what came out dark. Beside them, weighted by μ, the rows of every layer by
-/// itself. `prior`: empty, or nodes × texels × 3.
+/// noisy target it would prefer what came out dark. A target over white asks no more than white of an image
+/// below it. Beside them, weighted by μ, the rows of every layer by itself. `prior`: empty, or nodes × texels
+/// × 3.
 ///
 /// F enters per channel: a row's weights follow the mean of its channels, each channel's scale its own, which
 /// is exact where F has one hue within a pixel.

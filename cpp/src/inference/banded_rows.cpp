@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -35,11 +36,17 @@ void give(const Number* numbers, const float* weights, std::size_t count, Channe
   for (std::size_t e = 0; e < count; ++e) y[numbers[e]] += broadcast(weights[e]) * t;
 }
 
-// What a thread copies a band's texels to.
-Vector& local_texels() {
-  static thread_local Vector texels;
-  return texels;
+// What a thread copies a band's texels to, and where it makes its shares.
+struct Local {
+  Vector texels, shares;
+};
+Local& local() {
+  static thread_local Local memory;
+  return memory;
 }
+
+// A band that sees one node as it is can own unknowns.
+bool sees_one(const SolverView& view) { return view.nodes.size() == 1 && view.nodes.front().weight == 1.0F; }
 
 }  // namespace
 
@@ -64,10 +71,6 @@ BandedRows::BandedRows(std::span<const SolverView> views, std::size_t texels_per
     std::vector<std::uint32_t> number_of(texels_per_node_, kNoTexel);
     for (std::size_t b = begin; b < end; ++b) find_texels(bands_[b], number_of);
   });
-  for (Band& band : bands_) {
-    band.first_slot = slots_;
-    slots_ += band.texel_count;
-  }
 }
 
 void BandedRows::cut(std::size_t view) {
@@ -77,7 +80,7 @@ void BandedRows::cut(std::size_t view) {
     while (end < matrix.rows() && matrix.row_offsets[end + 1] - matrix.row_offsets[begin] <= kBandEntries) {
       ++end;
     }
-    bands_.push_back({view, begin, end, 0, 0, 0, {}});
+    bands_.push_back({view, begin, end, 0, {}});
     begin = end;
   }
 }
@@ -99,50 +102,86 @@ void BandedRows::find_texels(Band& band, std::vector<std::uint32_t>& number_of) 
     }
   }
   for (const std::uint32_t texel : band.texels) number_of[texel] = kNoTexel;
-  band.texel_count = band.texels.size();
 }
 
 std::vector<std::uint32_t> BandedRows::number(int nodes) {
-  std::size_t count = 0;
-  for (Band& band : bands_) {
-    band.first_unknown = count;
-    count += band.texel_count * views_[band.view].nodes.size();
+  std::size_t reads = 0;
+  for (const Band& band : bands_) reads += band.texels.size() * views_[band.view].nodes.size();
+  if (reads >= std::numeric_limits<std::uint32_t>::max() / 2) {
+    throw InvalidArgument("views", std::to_string(reads) + " texels of bands of rows", "below 2^31");
   }
-  if (count >= std::numeric_limits<std::uint32_t>::max()) {
-    throw InvalidArgument("views", std::to_string(count) + " texels of bands of rows", "below 2^32");
-  }
-  unknowns_.resize(count);
   std::vector<std::uint32_t> number_of(texels_per_node_ * static_cast<std::size_t>(nodes), kNoTexel);
   std::vector<std::uint32_t> numbered;
-  for (const Band& band : bands_) {
-    std::uint32_t* to = unknowns_.data() + band.first_unknown;
-    for (const std::uint32_t texel : band.texels) {
-      for (const NodeWeight& node : views_[band.view].nodes) {
-        const std::size_t all = texels_per_node_ * static_cast<std::size_t>(node.node) + texel;
-        if (number_of[all] == kNoTexel) {
-          number_of[all] = static_cast<std::uint32_t>(numbered.size());
-          numbered.push_back(static_cast<std::uint32_t>(all));
-        }
-        *to++ = number_of[all];
+  for (Band& band : bands_) number(band, number_of, numbered);
+  unknowns_ = numbered.size();
+  for_bands([&](const Band& band, std::size_t) {
+    // From the order in which rows meet them to first the own, then the others; `texels` holds the place.
+    const std::vector<std::uint64_t>& offsets = views_[band.view].matrix->row_offsets;
+    const std::size_t end = band.first_number + offsets[band.end] - offsets[band.begin];
+    for (std::size_t e = band.first_number; e < end; ++e) {
+      if (band.wide) {
+        wide_[e] = band.texels[wide_[e]];
+      } else {
+        narrow_[e] = static_cast<std::uint16_t>(band.texels[narrow_[e]]);
       }
     }
+  });
+  for (Band& band : bands_) band.texels = {};
+  find_parts();
+  return numbered;
+}
+
+void BandedRows::number(Band& band, std::vector<std::uint32_t>& number_of,
+                        std::vector<std::uint32_t>& numbered) {
+  const std::vector<NodeWeight>& nodes = views_[band.view].nodes;
+  const auto numbered_now = [&](std::size_t texel) {
+    if (number_of[texel] == kNoTexel) {
+      number_of[texel] = static_cast<std::uint32_t>(numbered.size());
+      numbered.push_back(static_cast<std::uint32_t>(texel));
+    }
+    return number_of[texel];
+  };
+  band.first_own = numbered.size();
+  band.first_other = others_;
+  band.first_read = reads_.size();
+  std::vector<std::uint32_t> places;
+  places.reserve(band.texels.size());
+  constexpr std::uint32_t kOther = 0x80000000U;
+  for (const std::uint32_t texel : band.texels) {
+    const std::size_t first = texels_per_node_ * static_cast<std::size_t>(nodes.front().node) + texel;
+    if (sees_one(views_[band.view]) && number_of[first] == kNoTexel) {
+      numbered_now(first);
+      places.push_back(static_cast<std::uint32_t>(band.own++));
+      continue;
+    }
+    for (const NodeWeight& node : nodes) {
+      reads_.push_back(numbered_now(texels_per_node_ * static_cast<std::size_t>(node.node) + texel));
+    }
+    places.push_back(kOther | static_cast<std::uint32_t>(band.others++));
   }
-  first_part_.assign(numbered.size() + 2, 0);
-  for (const std::uint32_t unknown : unknowns_) ++first_part_[unknown + 2];
+  others_ += band.others;
+  for (std::uint32_t& place : places) {
+    if ((place & kOther) != 0) place = static_cast<std::uint32_t>(band.own) + (place & ~kOther);
+  }
+  band.texels = std::move(places);
+}
+
+// Sorts the shares in what other bands own by unknown.
+void BandedRows::find_parts() {
+  first_part_.assign(unknowns_ + 2, 0);
+  for (const std::uint32_t unknown : reads_) ++first_part_[unknown + 2];
   for (std::size_t i = 2; i < first_part_.size(); ++i) first_part_[i] += first_part_[i - 1];
-  parts_.resize(count);
-  for (Band& band : bands_) {
-    const std::uint32_t* unknown = unknowns_.data() + band.first_unknown;
-    for (std::size_t i = 0; i < band.texel_count; ++i) {
+  parts_.resize(reads_.size());
+  for (const Band& band : bands_) {
+    const std::uint32_t* unknown = reads_.data() + band.first_read;
+    for (std::size_t i = 0; i < band.others; ++i) {
+      const auto share = static_cast<std::uint32_t>(unknowns_ + band.first_other + i);
       for (const NodeWeight& node : views_[band.view].nodes) {
-        parts_[first_part_[*unknown++ + 1]++] = {static_cast<std::uint32_t>(band.first_slot + i),
-                                                 node.weight};
+        parts_[first_part_[*unknown++ + 1]++] = {share, node.weight};
       }
     }
-    band.texels = {};
   }
   first_part_.pop_back();
-  return numbered;
 }
 
 template <typename Body>
@@ -169,28 +208,41 @@ void BandedRows::for_rows(const Band& band, const Row& row) const {
   }
 }
 
-void BandedRows::collect(const Band& band, const Vector& x, Vector& local) const {
+const Channels* BandedRows::collect(const Band& band, const Vector& x) const {
+  Vector& to = local().texels;
+  if (to.size() < band.own + band.others) to.resize(band.own + band.others);
+  std::copy_n(x.begin() + static_cast<std::ptrdiff_t>(band.first_own), band.own, to.begin());
   const std::vector<NodeWeight>& nodes = views_[band.view].nodes;
-  const std::uint32_t* unknown = unknowns_.data() + band.first_unknown;
-  if (local.size() < band.texel_count) local.resize(band.texel_count);
-  if (nodes.size() == 1) {
-    const Channels weight = broadcast(nodes.front().weight);
-    for (std::size_t i = 0; i < band.texel_count; ++i) local[i] = weight * x[unknown[i]];
-    return;
+  const std::uint32_t* unknown = reads_.data() + band.first_read;
+  Channels* other = to.data() + band.own;
+  if (sees_one(views_[band.view])) {
+    for (std::size_t i = 0; i < band.others; ++i) other[i] = x[unknown[i]];
+  } else {
+    for (std::size_t i = 0; i < band.others; ++i) {
+      Channels sum{};
+      for (const NodeWeight& node : nodes) sum += broadcast(node.weight) * x[*unknown++];
+      other[i] = sum;
+    }
   }
-  for (std::size_t i = 0; i < band.texel_count; ++i) {
-    Channels sum{};
-    for (const NodeWeight& node : nodes) sum += broadcast(node.weight) * x[*unknown++];
-    local[i] = sum;
-  }
+  return to.data();
+}
+
+Channels* BandedRows::clear(const Band& band) {
+  local().shares.assign(band.own + band.others, Channels{});
+  return local().shares.data();
+}
+
+void BandedRows::put(const Band& band, const Channels* made, Vector& shares) const {
+  std::copy_n(made, band.own, shares.begin() + static_cast<std::ptrdiff_t>(band.first_own));
+  std::copy_n(made + band.own, band.others,
+              shares.begin() + static_cast<std::ptrdiff_t>(unknowns_ + band.first_other));
 }
 
 void BandedRows::multiply(const Vector& x, Vector& b) const {
   for_bands([&](const Band& band, std::size_t) {
-    Vector& local = local_texels();
-    collect(band, x, local);
+    const Channels* texels = collect(band, x);
     for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      b[r] = read(numbers, entries, count, local.data());
+      b[r] = read(numbers, entries, count, texels);
     });
   });
 }
@@ -199,17 +251,16 @@ ChannelSums BandedRows::residual(const Vector& weights, const Vector& target, co
                                  Vector& shares) const {
   std::vector<ChannelSums> of_bands(bands_.size());
   for_bands([&](const Band& band, std::size_t number) {
-    Vector& local = local_texels();
-    collect(band, x, local);
-    Channels* share = shares.data() + band.first_slot;
-    std::fill_n(share, band.texel_count, Channels{});
+    const Channels* texels = collect(band, x);
+    Channels* made = clear(band);
     ChannelDoubles squares{};
     for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      const Channels t = target[r] - read(numbers, entries, count, local.data());
+      const Channels t = target[r] - read(numbers, entries, count, texels);
       const Channels weighted = weights[r] * t;
       add_product(squares, weighted, t);
-      give(numbers, entries, count, weighted, share);
+      give(numbers, entries, count, weighted, made);
     });
+    put(band, made, shares);
     of_bands[number] = to_sums(squares);
   });
   ChannelSums sums{};
@@ -221,35 +272,34 @@ ChannelSums BandedRows::residual(const Vector& weights, const Vector& target, co
 
 void BandedRows::normal(const Vector& weights, const Vector& x, Vector& shares) const {
   for_bands([&](const Band& band, std::size_t) {
-    Vector& local = local_texels();
-    collect(band, x, local);
-    Channels* share = shares.data() + band.first_slot;
-    std::fill_n(share, band.texel_count, Channels{});
+    const Channels* texels = collect(band, x);
+    Channels* made = clear(band);
     for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      give(numbers, entries, count, weights[r] * read(numbers, entries, count, local.data()), share);
+      give(numbers, entries, count, weights[r] * read(numbers, entries, count, texels), made);
     });
+    put(band, made, shares);
   });
 }
 
 void BandedRows::transposed(const Vector& weights, const Vector& t, Vector& shares) const {
   for_bands([&](const Band& band, std::size_t) {
-    Channels* share = shares.data() + band.first_slot;
-    std::fill_n(share, band.texel_count, Channels{});
+    Channels* made = clear(band);
     for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      give(numbers, entries, count, weights[r] * t[r], share);
+      give(numbers, entries, count, weights[r] * t[r], made);
     });
+    put(band, made, shares);
   });
 }
 
 void BandedRows::diagonal(const Vector& weights, Vector& shares) const {
   for_bands([&](const Band& band, std::size_t) {
-    Channels* share = shares.data() + band.first_slot;
-    std::fill_n(share, band.texel_count, Channels{});
+    Channels* made = clear(band);
     for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
       for (std::size_t e = 0; e < count; ++e) {
-        share[numbers[e]] += broadcast(entries[e] * entries[e]) * weights[r];
+        made[numbers[e]] += broadcast(entries[e] * entries[e]) * weights[r];
       }
     });
+    put(band, made, shares);
   });
 }
 

@@ -24,15 +24,15 @@ class BandedRows {
   BandedRows(std::span<const SolverView> views, std::size_t texels_per_node);
 
   /// Numbers the texels of all nodes that a row sees, and returns them: unknown i is texel i of the result,
-  /// counted through all nodes. Their order is that in which the bands meet them, so that what a band copies
-  /// together lies together. To be called once.
+  /// counted through all nodes. Their order is that in which the bands meet them: those that a band is the
+  /// first to meet, its own, lie together, and so do its shares in them. To be called once.
   std::vector<std::uint32_t> number(int nodes);
 
   std::size_t views() const { return views_.size(); }
   std::size_t rows() const { return first_row_.back(); }
   std::size_t first_row(std::size_t view) const { return first_row_[view]; }
-  /// Length of `shares` below.
-  std::size_t slots() const { return slots_; }
+  /// Length of `shares` below, which have to be 0 before their first use.
+  std::size_t shares() const { return unknowns_ + others_; }
 
   /// b = A x.
   void multiply(const Vector& x, Vector& b) const;
@@ -47,17 +47,17 @@ class BandedRows {
 
   /// What an unknown gets of all bands.
   Channels sum(const Vector& shares, std::size_t unknown) const {
-    Channels total{};
+    Channels total = shares[unknown];
     for (std::uint32_t i = first_part_[unknown]; i < first_part_[unknown + 1]; ++i) {
-      total += broadcast(parts_[i].weight) * shares[parts_[i].slot];
+      total += broadcast(parts_[i].weight) * shares[parts_[i].share];
     }
     return total;
   }
   /// The same with squared weights of the nodes.
   Channels sum_of_squares(const Vector& shares, std::size_t unknown) const {
-    Channels total{};
+    Channels total = shares[unknown];
     for (std::uint32_t i = first_part_[unknown]; i < first_part_[unknown + 1]; ++i) {
-      total += broadcast(parts_[i].weight * parts_[i].weight) * shares[parts_[i].slot];
+      total += broadcast(parts_[i].weight * parts_[i].weight) * shares[parts_[i].share];
     }
     return total;
   }
@@ -65,24 +65,30 @@ class BandedRows {
  private:
   struct Band {
     std::size_t view;
-    std::size_t begin, end;             // rows of the view
-    std::size_t first_slot;             // of its texels, in all bands
-    std::size_t first_number;           // of its entries, in narrow_ or wide_
-    std::size_t first_unknown;          // of its texels, in unknowns_: of each texel that of every node
-    std::vector<std::uint32_t> texels;  // in the order in which rows meet them; dropped once numbered
-    std::size_t texel_count = 0;
-    bool wide = false;  // 16 bits are too few
+    std::size_t begin, end;                   // rows of the view
+    std::size_t first_number;                 // of its entries, in narrow_ or wide_
+    std::vector<std::uint32_t> texels;        // in the order in which rows meet them; dropped once numbered
+    std::size_t first_own = 0, own = 0;       // unknowns
+    std::size_t first_other = 0, others = 0;  // shares in what other bands own, after those of the unknowns
+    std::size_t first_read = 0;  // in reads_: the unknown of each other texel, of every node in turn
+    bool wide = false;           // 16 bits are too few
   };
-  /// A band's share in an unknown, and the node's weight in what its view sees.
+  /// A share in what another band owns, and the node's weight in what its view sees.
   struct Part {
-    std::uint32_t slot;
+    std::uint32_t share;
     float weight;
   };
 
   void cut(std::size_t view);
   void find_texels(Band& band, std::vector<std::uint32_t>& number_of);
+  /// Finds out which texels are a band's own, and numbers those.
+  void number(Band& band, std::vector<std::uint32_t>& number_of, std::vector<std::uint32_t>& numbered);
+  void find_parts();
   /// Copies together what a band reads.
-  void collect(const Band& band, const Vector& x, Vector& local) const;
+  const Channels* collect(const Band& band, const Vector& x) const;
+  /// Where a band's shares are made, all 0.
+  static Channels* clear(const Band& band);
+  void put(const Band& band, const Channels* made, Vector& shares) const;
   /// `row(r, numbers, weights, count)` for every row of a band, r counted through all views.
   template <typename Row>
   void for_rows(const Band& band, const Row& row) const;
@@ -96,8 +102,8 @@ class BandedRows {
   std::vector<Band> bands_;
   std::vector<std::uint16_t> narrow_;
   std::vector<std::uint32_t> wide_;
-  std::vector<std::uint32_t> unknowns_;
-  std::size_t slots_ = 0;
+  std::vector<std::uint32_t> reads_;
+  std::size_t unknowns_ = 0, others_ = 0;
   std::vector<std::uint32_t> first_part_;
   std::vector<Part> parts_;
 };

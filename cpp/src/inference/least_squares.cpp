@@ -71,7 +71,7 @@ bool keeps(const Bounds& bounds, const Vector& x, const Vector& s, const Vector&
 LeastSquares::LeastSquares(const MapSolver::State& state, Vector row_weights)
     : state_(state),
       weights_(std::move(row_weights)),
-      shares_(state.rows.slots()),
+      shares_(state.rows.shares()),
       diagonal_(state.unknowns()) {
   state.rows.diagonal(weights_, shares_);
   parallel_for(diagonal_.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {

@@ -41,13 +41,21 @@ Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<
   }
   parallel_for(numbers, kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
+      Links& links = links_[i];
       float d = 0.0F;
-      for (std::uint32_t neighbour : links_[i].neighbours)
-        d += neighbour != kNoTexel ? options_.smoothness : 0.0F;
+      for (std::uint32_t& neighbour : links.neighbours) {
+        if (neighbour == kNoTexel) {
+          neighbour = static_cast<std::uint32_t>(i);
+        } else {
+          d += options_.smoothness;
+        }
+      }
       d += options_.level_agreement * 0.25F * child_count(i);
-      if (links_[i].parent != kNoTexel) {
-        links_[i].siblings = child_count(links_[i].parent);
-        d += options_.level_agreement * 0.25F / links_[i].siblings;
+      if (links.parent == kNoTexel) {
+        links.parent = static_cast<std::uint32_t>(i);
+      } else {
+        links.share = 1.0F / child_count(links.parent);
+        d += options_.level_agreement * 0.25F * links.share;
       }
       diagonal_[i] = d;
     }

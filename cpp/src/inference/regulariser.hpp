@@ -31,11 +31,8 @@ class Regulariser {
   Channels at(std::size_t i, const Vector& x, const Vector& scratch) const {
     const Links& links = links_[i];
     Channels difference{};
-    for (std::uint32_t neighbour : links.neighbours) {
-      if (neighbour != kNoTexel) difference += x[i] - x[neighbour];
-    }
-    Channels disagreement = scratch[i];
-    if (links.parent != kNoTexel) disagreement -= scratch[links.parent] / broadcast(links.siblings);
+    for (std::uint32_t neighbour : links.neighbours) difference += x[i] - x[neighbour];
+    const Channels disagreement = scratch[i] - broadcast(links.share) * scratch[links.parent];
     return broadcast(options_.smoothness) * difference + broadcast(options_.level_agreement) * disagreement;
   }
 
@@ -43,10 +40,11 @@ class Regulariser {
   float diagonal(std::size_t number) const { return diagonal_[number]; }
 
  private:
+  /// What is missing is the texel itself, which differs from itself by nothing.
   struct Links {
     std::array<std::uint32_t, 4> neighbours;
     std::uint32_t parent;
-    float siblings;  // children of the parent that have a number
+    float share = 0.0F;  // in the mean of the parent's children, those that have a number
   };
   /// A texel that has children, and how many of them have a number.
   struct Parent {

@@ -26,10 +26,21 @@ SMALL: dict[str, Any] = {
 def test_an_arc_is_looked_at_between_its_samples_and_beyond(tmp_path: Path) -> None:
     views = {"count": 2, "degrees": 1.0, "start": 22.0, "size": [48, 36]}
     config = parse_config({**SMALL, "views": views, "static": {"views": 6}}, "arc")
-    looks = measured(config, tmp_path / "pem")
-    assert [look.place for look in looks] == ["half-way", *(f"{degrees:g}° off" for degrees in BEYOND)]
-    assert looks[0].pem > looks[0].captured + 3.0
+    reach = measured(config, tmp_path / "pem")
+    looks = reach.looks
+    assert [look.place for look in looks] == [
+        "on",
+        "half-way",
+        *(f"{degrees:g}° off" for degrees in BEYOND),
+    ]
+    assert all(look.pem > look.captured + 3.0 for look in looks[:2])
     assert looks[0].pem > looks[-1].pem
+    # A draft's plan tries nothing.
+    assert reach.foretold is None
+    assert reach.least_above_static_set is not None
+    least, place = reach.least_above_static_set
+    assert least == min(look.pem - look.static_set for look in looks if look.static_set is not None)
+    assert place in [look.place for look in looks]
     assert all(look.static_set is not None for look in looks)
     # Far off the samples little but the static set is drawn.
     assert looks[-1].pem == pytest.approx(looks[-1].static_set, abs=1.5)
@@ -45,7 +56,9 @@ def test_a_dome_is_looked_at_inside(tmp_path: Path) -> None:
         "rings": 2,
         "size": [48, 36],
     }
-    looks = measured(parse_config({**SMALL, "views": views}, "dome"), tmp_path / "pem")
+    reach = measured(parse_config({**SMALL, "views": views}, "dome"), tmp_path / "pem")
+    looks = reach.looks
+    assert reach.least_above_static_set is None
     assert [look.place for look in looks] == ["inside"] * INSIDE
     assert all(look.static_set is None for look in looks)
     assert all(look.noise > 10.0 for look in looks)

@@ -83,6 +83,12 @@ def lead_advice(stage: Stage, plan: Plan) -> str | None:
     plan
         Of the bake.
     """
+    trial = trial_of(stage, plan)
+    return None if trial is None else advice_on(trial)
+
+
+def trial_of(stage: Stage, plan: Plan) -> Trial | None:
+    """Try what `lead_advice` speaks of; None where there is nothing to try."""
     stage = stage.planned(plan)
     config, space = stage.config, stage.space
     middle = space.middle_after((len(space) - 1) // 2)
@@ -92,8 +98,7 @@ def lead_advice(stage: Stage, plan: Plan) -> str | None:
         return None
     if any(material.specular and material.lobe != "mirror" for material in materials_of(stage)):
         return None
-    trial = run_trial(stage, plan)
-    return None if trial is None else advice_on(trial)
+    return run_trial(stage, plan)
 
 
 def advice_on(trial: Trial) -> str:

@@ -1,7 +1,8 @@
 """How far a PEM's lead reaches: against a captured map at infinity and its own static set, by scenes.
 
 `python -m mirrorbake.study.reach SCENE.toml ...` bakes each scene into a temporary folder and looks at it
-half-way between samples, at places spread inside of a dome, and up to 30 degrees beyond the samples.
+on a sample, half-way to the next, at places spread inside of a dome, and up to 30 degrees beyond the samples.
+Below each stands where it is least above its static set, and what its plan foretold.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake.bake.bake import bake
+from mirrorbake.bake.trial import trial_of
 from mirrorbake.errors import one_line_errors
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.scene.load import load_config, parse_override
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
     from mirrorbake.scene.config import SceneConfig
     from mirrorbake.scene.parameters import Point
 
-BEYOND = (5.0, 10.0, 20.0, 30.0)
+BEYOND = (2.0, 5.0, 10.0, 20.0, 30.0)
 """Degrees past the last sample's azimuth."""
 INSIDE = 5
 """Places inside of a dome."""
@@ -99,7 +101,8 @@ def looks(pem: OpenedPem) -> Iterator[Look]:
     if cameras.kind == "dome":
         places += [("inside", point, cameras.camera(point)) for point in spread_inside(pem)]
     elif between is not None:
-        places.append(("half-way", between, cameras.camera(between)))
+        first = space.sample(index)
+        places += [("on", first, cameras.camera(first)), ("half-way", between, cameras.camera(between))]
         last = space.sample(len(space) - 1)
         azimuth, elevation = cameras.angles_of(cameras.eye(last))
         turn = math.copysign(1.0, cameras.degrees)
@@ -137,11 +140,30 @@ def spread_inside(pem: OpenedPem) -> list[Point]:
     return places
 
 
-def measured(config: SceneConfig, folder: Path) -> list[Look]:
+@dataclass(frozen=True)
+class Reach:
+    """What was found of a scene."""
+
+    looks: list[Look]
+    foretold: float | None
+    """Decibels by which the plan's trial beat a captured map half-way; None: it tried nothing."""
+
+    @property
+    def least_above_static_set(self) -> tuple[float, str] | None:
+        """Decibels by which the PEM is above its static set where that is least, and the place."""
+        known = [
+            (look.pem - look.static_set, look.place) for look in self.looks if look.static_set is not None
+        ]
+        return min(known, default=None)
+
+
+def measured(config: SceneConfig, folder: Path) -> Reach:
     """Bake a scene into a folder and look at it."""
     stage = prepare_stage(config)
     summary = bake(config, folder, stage=stage)
-    return list(looks(open_pem(folder, stage.planned(summary.plan))))
+    found = list(looks(open_pem(folder, stage.planned(summary.plan))))
+    trial = trial_of(stage, summary.plan)
+    return Reach(found, None if trial is None else trial.lead)
 
 
 def _shown(light: FloatArray) -> NDArray[np.float64]:
@@ -166,7 +188,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name, config in scenes.items():
         start = time.process_time()
         with tempfile.TemporaryDirectory() as folder:
-            for look in measured(config, Path(folder) / "pem"):
+            reach = measured(config, Path(folder) / "pem")
+            for look in reach.looks:
                 static = "" if look.static_set is None else f"{look.static_set:.1f}"
                 lead = look.pem - look.captured
                 print(
@@ -174,6 +197,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
                     f"{lead:+.1f} | {look.noise:.1f} |",
                     flush=True,
                 )
+        least = reach.least_above_static_set
+        words = "no static set" if least is None else f"least above it {least[1]}: {least[0]:+.1f} dB"
+        foretold = "nothing foretold" if reach.foretold is None else f"foretold lead {reach.foretold:+.1f} dB"
+        print(f"| {Path(name).stem} | {words}; {foretold} | | | | | |", flush=True)
         print(f"{name}: {time.process_time() - start:.0f} s of processor time", file=sys.stderr, flush=True)
 
 

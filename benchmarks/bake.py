@@ -1,14 +1,17 @@
 """A bake's seconds per view by stage beside those of [PEM], and drawing a view beside rendering it anew.
 
 The set-up is that of [PEM] §6, the teapot of 40,000 triangles in its room with maps of 256²×6, of whose 100
-views one is baked. The paper's times, 15 minutes of ray tracing and 5.5 of inference a view, stand beside
-ours for what has become of them since 2001, not as a peer on the same machine. Then a mirror ball in a room
+views one is baked, every layer by itself as there, and two neighbouring ones by the display fit, in draft and
+in normal quality without a static set; the peak of memory so far is printed after each. The paper's times, 15
+minutes of ray tracing and 5.5 of inference a view, stand beside ours for what has become of them since 2001,
+not as a peer on the same machine. Then a mirror ball in a room
 is traced, solved for and drawn from the maps, and Mitsuba 3 renders the same view for as long as it takes to
 be as near to a reference of many samples. Without Mitsuba its cases are left out, with a sentence.
 """
 
 from __future__ import annotations
 
+import resource
 import sys
 import tempfile
 import time
@@ -57,6 +60,36 @@ def stages() -> Iterator[Case]:
         ("matrices and solving", sum(t.build_s + t.solve_s for t in timings) / VIEWS, PAPER_INFER_S),
     ):
         yield Case(f"the paper's teapot, {stage}", "s per view", ours, paper, "[PEM], 2001", 0.0, 0.0)
+
+
+def qualities() -> Iterator[Case]:
+    """Seconds of a view of two neighbouring ones, fitted as they will be displayed."""
+    for quality in ("draft", "normal"):
+        overrides = [
+            "views.count=2",
+            "views.start=49",
+            "views.degrees=1",
+            "static.views=0",
+            f"auto.quality='{quality}'",
+        ]
+        config = load_config(EXAMPLE, [parse_override(text) for text in overrides])
+        with tempfile.TemporaryDirectory() as folder:
+            start = time.process_time()
+            bake(config, Path(folder) / "pem")
+            spent = time.process_time() - start
+            store = PemStore.open(Path(folder) / "pem")
+            timings = [store.read_timings(index) for index in range(2)]
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+        print(
+            f"{quality} quality: {spent:.0f} s of processor time for two views, with plan and preparation; "
+            f"peak of memory so far {peak:.2f} GiB",
+            file=sys.stderr,
+        )
+        taken = sum(t.trace_s + t.build_s + t.solve_s for t in timings) / 2
+        paper = PAPER_TRACE_S + PAPER_INFER_S
+        yield Case(
+            f"the paper's teapot, {quality} quality", "s per view", taken, paper, "[PEM], 2001", 0.0, 0.0
+        )
 
 
 def drawing() -> Iterator[Case]:
@@ -129,6 +162,7 @@ def drawing() -> Iterator[Case]:
 
 def cases() -> Iterator[Case]:
     yield from stages()
+    yield from qualities()
     yield from drawing()
 
 

@@ -50,7 +50,7 @@ def test_the_weight_is_the_one_that_shows_best_what_it_did_not_see(tmp_path: Pat
     found = {}
     # Draft targets are noisy: the least regularised maps show their noise.
     for wanted in ("auto", min(CANDIDATES)):
-        config = scene(tmp_path, smoothness=wanted, prior_weight=6e-4)
+        config = scene(tmp_path, smoothness=wanted, prior_weight=2e-4)
         bake(parse_config(config, "weights"), tmp_path / str(wanted))
         found[wanted] = open_pem(tmp_path / str(wanted))
     pem = found["auto"]
@@ -58,7 +58,7 @@ def test_the_weight_is_the_one_that_shows_best_what_it_did_not_see(tmp_path: Pat
     assert decision.automatic
     assert decision.value in CANDIDATES
     assert "held out are met to" in decision.reason
-    # An opened PEM has it, with the others in the ratio that they have to the usual 3e-4.
+    # An opened PEM has it, with the others in the ratio that they have to the usual 1e-4.
     infer = pem.stage.config.infer
     assert infer.smoothness == decision.value
     np.testing.assert_allclose(infer.prior_weight, 2.0 * decision.value)

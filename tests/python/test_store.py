@@ -40,7 +40,7 @@ def make_plan(samples: int = 4) -> Plan:
         "layers.diffuse": False,
         "shells": [{"name": "local", "objects": ["itself"]}, {"name": "distant"}],
         "layers.local": True, "layers.hull_split": False, "maps.distant": "infinite", "maps.size": SIZE,
-        "views.traced": 0, "infer.passes": 2, "infer.neighbours": 0.3, "static.views": 0,
+        "views.traced": 0, "views.around": 0, "infer.passes": 2, "infer.neighbours": 0.3, "static.views": 0,
         "maps.shared_distant": False,
     }  # fmt: skip
     decisions = (Decision(key, None, value, True, "measured", 0.25) for key, value in values.items())
@@ -172,7 +172,7 @@ def test_the_maps_can_be_read_with_nothing_but_zarr(tmp_path: Path) -> None:
     fill(make_store(tmp_path))
     group: Any = zarr.open_group(tmp_path / GROUP_NAME, mode="r")
     attributes: Any = group.attrs["mirrorbake"]
-    assert attributes["format_version"] == 6
+    assert attributes["format_version"] == 7
     sizes = attributes["conventions"]["level_sizes"]
     assert sizes == [8, 4, 2, 1]
     names = [entry["name"] for entry in attributes["maps"]]
@@ -324,7 +324,7 @@ def test_damaged_metadata_is_one_clear_error(tmp_path: Path) -> None:
         other = json.loads(intact)
         other["attributes"]["mirrorbake"]["format_version"] = version
         metadata.write_text(json.dumps(other))
-        with pytest.raises(StoreError, match=f"format version {version}, this library reads 6.*{advice}"):
+        with pytest.raises(StoreError, match=f"format version {version}, this library reads 7.*{advice}"):
             PemStore.open(tmp_path)
 
 

@@ -23,6 +23,8 @@ class Quality:
     passes: int
     neighbours: float
     """Weight of neighbouring views, where they are near."""
+    around: int
+    """Views beside an arc around each of its samples, where these are near."""
     traced: int
     """Views between maps that are far apart, in a cell of one axis; squared in one of two."""
     static: int
@@ -30,9 +32,9 @@ class Quality:
 
 
 QUALITIES: Mapping[str, Quality] = {
-    "draft": Quality(noise=0.0, passes=1, neighbours=0.0, traced=0, static=0),
-    "normal": Quality(noise=0.01, passes=2, neighbours=0.3, traced=1, static=64),
-    "high": Quality(noise=0.005, passes=2, neighbours=0.3, traced=2, static=128),
+    "draft": Quality(noise=0.0, passes=1, neighbours=0.0, around=0, traced=0, static=0),
+    "normal": Quality(noise=0.01, passes=2, neighbours=0.3, around=8, traced=1, static=64),
+    "high": Quality(noise=0.005, passes=2, neighbours=0.3, around=16, traced=2, static=128),
 }
 
 NEAR_DEGREES = 3.0
@@ -95,9 +97,11 @@ def quality_decisions(stage: Stage, samples: int) -> list[Decision]:
     traced = quality.traced**axes if several and not near and display else 0
     neighbours = quality.neighbours if near and display else 0.0
     static, static_reason = _static(stage, quality)
+    around, around_reason = _around(stage, quality, near=near)
     return [
         decided("trace.noise", noise, noise_reason),
         decided("views.traced", traced, _words(traced > 0, apart, several, "by the blend of maps")),
+        decided("views.around", around, around_reason),
         decided("infer.passes", quality.passes, "how often weights are taken from the fit's own image"),
         decided("infer.neighbours", neighbours, _words(neighbours > 0.0, apart, several, "by each map")),
         decided("static.views", static, static_reason),
@@ -108,6 +112,22 @@ def _words(used: bool, apart: str, several: bool, how: str) -> str:
     if not several:
         return "there is one map along the camera's axes"
     return f"{apart}, views around are fitted {how}" if used else f"{apart}, no further views are fitted"
+
+
+def _around(stage: Stage, quality: Quality, *, near: bool) -> tuple[int, str]:
+    if stage.config.views.kind != "arc":
+        return 0, "there is no arc beside which they would be"
+    if stage.config.infer.fit != "display":
+        return 0, 'infer.fit = "layers" has none'
+    if stage.space.changes_scene:
+        return 0, "the scene changes"
+    if stage.config.infer.matrix == "probed":
+        return 0, "each of them would take pictures of its own"
+    if not near:
+        return 0, "maps are far apart, or there is but one"
+    if quality.around == 0:
+        return 0, "samples are fitted to their own views"
+    return quality.around, "samples are fitted to views beside the arc, too, so that their maps hold there"
 
 
 def _static(stage: Stage, quality: Quality) -> tuple[int, str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.around import places_around
 from mirrorbake.bake.captured import captured_pyramids
 from mirrorbake.bake.fit import DisplayFitter, FitView, solve_options
 from mirrorbake.bake.static_set import static_views
@@ -218,6 +219,13 @@ class SampleBaker:
             views += [
                 FitView(trace(space.sample(other)), mine, infer.neighbours) for other in beside(space, index)
             ]
+        count = self._stage.config.views.around
+        assert count is not None, "the scene has to be planned first"
+        if self._stage.config.views.kind == "arc":
+            for place in places_around(self._stage.built.cameras, space.sample(index), count):
+                beside_it = self._tracer.around(place.azimuth, place.elevation)
+                if beside_it is not None:
+                    views.append(FitView(beside_it, ((number[index], 1.0),), place.weight))
         return nodes, views
 
     def _fit_layers(

@@ -10,7 +10,7 @@ import numpy as np
 
 from mirrorbake.bake.captured import captured_pyramids
 from mirrorbake.bake.fit import DisplayFitter, FitView
-from mirrorbake.bake.targets import ViewTracer
+from mirrorbake.bake.targets import ViewTracer, few_samples
 from mirrorbake.pem.layout import read_back, stored_map
 from mirrorbake.scene.pose import AT_REST
 
@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 
 ROWS = 8
 """Of a stripe of a view."""
-PIXELS = 24 << 16
-"""Of all views of a static set, about: of more, stripes are left out. Views add more than pixels do."""
+PIXELS = 400_000
+"""Of the object, in all views of a static set, about: of more, stripes are left out, so that they fit in
+memory all together. Views add more than pixels do."""
+COUNTED_VIEWS = 4
+"""In which the object's pixels are counted to find out how many there are in all."""
 
 NEAR_DEGREES = 10.0
 """Around the samples: there is a part of the views of a static set beside them, since most of what a PEM
@@ -131,8 +134,10 @@ def static_views(
 ) -> list[FitView]:
     """Return what a static set is fitted to: stripes of views from its dome."""
     cameras, places = stage.built.cameras, static_places(stage)
-    width, height = cameras.size
-    step = max(1, math.ceil(len(places) * width * height / PIXELS))
+    stage = few_samples(stage)
+    some = places[:: -(-len(places) // COUNTED_VIEWS)]
+    seen = [tracer.object_pixels(stage, cameras.around(*place)) for place, _ in some]
+    step = max(1, math.ceil(len(places) * sum(seen) / (len(seen) * PIXELS)))
     views: list[FitView] = []
     for number, (place, weight) in enumerate(places):
         report(number, len(places), f"view {number + 1} of {len(places)} for the static set")

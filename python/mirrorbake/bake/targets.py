@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -44,6 +44,16 @@ class TracedView:
     """Gets the renderer ready by whose pictures the view's rows are probed; None: they are analytic."""
 
 
+def few_samples(stage: Stage) -> Stage:
+    """Return a planned stage whose pixels all take `trace.samples`, however noisy they stay.
+
+    Of many views for one set of maps: where several show a texel, their noise is averaged, and further views
+    are worth more than less noise.
+    """
+    trace = stage.config.trace.model_copy(update={"noise": 0.0})
+    return replace(stage, config=stage.config.model_copy(update={"trace": trace}))
+
+
 class ViewTracer:
     """Traces the views of a planned stage for the run time of a PEM.
 
@@ -64,6 +74,7 @@ class ViewTracer:
         size = width * height * (56 + (12 + 56 * self._shells) // 2 + 60 * len(self._places))
         self._most = max(KEPT_BYTES // size, 3)
         self._kept: OrderedDict[Point, TracedView] = OrderedDict()
+        self._beside: OrderedDict[tuple[float, float], TracedView | None] = OrderedDict()
 
     def at(self, point: Point) -> TracedView:
         """Return the whole view of a point of the parameter space."""
@@ -76,11 +87,45 @@ class ViewTracer:
         self._kept[point] = self.trace(stage, stage.built.cameras.camera(point))
         return self._kept[point]
 
+    def around(self, azimuth: float, elevation: float) -> TracedView | None:
+        """Return what a view beside the arc shows of the object, from few samples; None: nothing."""
+        key = (azimuth, elevation)
+        if key in self._beside:
+            self._beside.move_to_end(key)
+            return self._beside[key]
+        while len(self._beside) >= self._most:
+            self._beside.popitem(last=False)
+        stage = few_samples(self._stage)
+        camera = stage.built.cameras.around(azimuth, elevation)
+        pixel = np.asarray(self._lookups(stage, camera, (0, 0, 0, 0)).pixel)
+        self._beside[key] = None
+        if len(pixel):
+            x, y = pixel % camera.width, pixel // camera.width
+            left, top = int(x.min()), int(y.min())
+            window = (left, top, int(x.max()) - left + 1, int(y.max()) - top + 1)
+            self._beside[key] = self.stripe(stage, camera, window)
+        return self._beside[key]
+
+    def object_pixels(self, stage: Stage, camera: _core.Camera) -> int:
+        """Return how many pixels of a camera's view see the object."""
+        return len(np.unique(np.asarray(self._lookups(stage, camera, (0, 0, 0, 0)).pixel)))
+
     def trace(self, stage: Stage, camera: _core.Camera) -> TracedView:
         """Return the whole view of a camera, in the scene of a stage."""
-        targets = self._targets(camera.width, camera.height)
+        lookups = self._lookups(stage, camera, (0, 0, 0, 0))
+        return self._traced(stage, camera, (0, 0, camera.width, camera.height), lookups)
+
+    def stripe(self, stage: Stage, camera: _core.Camera, window: Window) -> TracedView | None:
+        """Return what a part of a camera's view holds; None where it does not see the object."""
+        lookups = self._lookups(stage, camera, window)
+        return self._traced(stage, camera, window, lookups) if len(lookups) else None
+
+    def _traced(
+        self, stage: Stage, camera: _core.Camera, window: Window, lookups: _core.SurfaceSamples
+    ) -> TracedView:
+        targets = self._targets(window[2], window[3])
         bands = []
-        for y, traced in self._bands(stage, camera):
+        for y, traced in self._bands(stage, camera, window):
             targets.add(traced.samples, 0, y)
             bands.append(images_of_trace(traced))
         images = ViewImages(
@@ -88,20 +133,7 @@ class ViewTracer:
             np.concatenate([band.coverage for band in bands]),
             np.concatenate([band.background for band in bands]),
         )
-        whole = (0, 0, camera.width, camera.height)
-        return TracedView(
-            self._lookups(stage, camera, (0, 0, 0, 0)), targets, images, self._draw(stage, camera, whole)
-        )
-
-    def stripe(self, stage: Stage, camera: _core.Camera, window: Window) -> TracedView | None:
-        """Return what a part of a camera's view holds; None where it does not see the object."""
-        lookups = self._lookups(stage, camera, window)
-        if not len(lookups):
-            return None
-        traced = stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(window))
-        targets = self._targets(window[2], window[3])
-        targets.add(traced.samples)
-        return TracedView(lookups, targets, images_of_trace(traced), self._draw(stage, camera, window))
+        return TracedView(lookups, targets, images, self._draw(stage, camera, window))
 
     def _draw(self, stage: Stage, camera: _core.Camera, window: Window) -> Callable[[], Draw] | None:
         if self._renderer is None:
@@ -111,11 +143,14 @@ class ViewTracer:
     def _targets(self, width: int, height: int) -> _core.ViewTargets:
         return _core.ViewTargets(width, height, self._parts, self._shells, self._stacks)
 
-    def _bands(self, stage: Stage, camera: _core.Camera) -> Iterator[tuple[int, _core.LayerTrace]]:
-        rows = max(1, BATCH // (camera.width * stage.options.samples_per_pixel))
-        for y in range(0, camera.height, rows):
-            window = (0, y, camera.width, min(rows, camera.height - y))
-            yield y, stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(window))
+    def _bands(
+        self, stage: Stage, camera: _core.Camera, window: Window
+    ) -> Iterator[tuple[int, _core.LayerTrace]]:
+        left, top, width, height = window
+        rows = max(1, BATCH // (width * stage.options.samples_per_pixel))
+        for y in range(0, height, rows):
+            band = (left, top + y, width, min(rows, height - y))
+            yield y, stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(band))
 
     def _lookups(self, stage: Stage, camera: _core.Camera, window: Window) -> _core.SurfaceSamples:
         return stage.tracer.trace_visibility(

@@ -191,7 +191,12 @@ def run_trial(stage: Stage, plan: Plan) -> Trial | None:
 
 def _small_plan(plan: Plan) -> Plan:
     """Return a plan of small maps and steady targets, without static set and diffuse layer."""
-    changed = {"trace.samples": SAMPLES, "trace.noise": 0.0, "static.views": 0, "layers.diffuse": False}
+    changed = {
+        "trace.samples": SAMPLES,
+        "trace.noise": 0.0,
+        "static.views": 0,
+        "layers.diffuse": False,
+    }
     decisions = []
     for decision in plan.decisions:
         value = changed.get(decision.key, decision.value)

@@ -17,7 +17,7 @@ from mirrorbake.proxy import SHAPES, proxy_from_attributes
 from mirrorbake.scene.config_shells import ShellRule
 from mirrorbake.scene.config_values import MAX_IMAGE_SIDE, MAX_MAP_SIZE, one_of
 
-FORMAT_VERSION = 6
+FORMAT_VERSION = 7
 MAX_SAMPLES = 100_000_000
 MAX_PARTS = 65535
 
@@ -127,7 +127,7 @@ class Attributes(_Model):
     """All of the group's attribute."""
 
     format: Literal["pem"]
-    format_version: Literal[6]
+    format_version: Literal[7]
     library: Annotated[str, Field(max_length=100)]
     fingerprint: Sha256
     conventions: dict[str, Any]

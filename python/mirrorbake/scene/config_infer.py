@@ -30,15 +30,15 @@ class Infer(Section):
     neighbours: Annotated[Annotated[float, Field(ge=0, le=1)] | None, *AUTO] = None
     """Of fit = "display": weight of the neighbouring samples' views in the fit of a sample. "auto": 0.3 where
     they are close, by `auto.quality`."""
-    smoothness: Annotated[Annotated[float, Field(ge=0, le=1e6)] | None, *AUTO] = 3e-4
+    smoothness: Annotated[Annotated[float, Field(ge=0, le=1e6)] | None, *AUTO] = 1e-4
     """Weight λ of differences between neighbouring texels: small fits the sampled view best, large lasts away
     from it. "auto": by what is held out; `level_agreement` and `prior_weight` are scaled alike then."""
-    level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
+    level_agreement: Annotated[float, Field(ge=0, le=1e6)] = 1e-4
     """Weight λ of a texel's difference from the mean of the four below it in the pyramid."""
     prior: Literal["smooth", "captured"] = "captured"
     """What the distant map's texels that a view does not determine fall back to: a smooth fill, or the
     captured surroundings."""
-    prior_weight: Annotated[float, Field(ge=0, le=1e6)] = 3e-4
+    prior_weight: Annotated[float, Field(ge=0, le=1e6)] = 1e-4
     """Weight λ of the difference from the captured surroundings."""
     footprint_scale: Annotated[float, Field(gt=0, le=4)] = 0.25
     """Size of a lookup's footprint in pixels: 1 filters as graphics hardware does for one sample per pixel,

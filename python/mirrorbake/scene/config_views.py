@@ -17,9 +17,9 @@ _DEFAULTS: Mapping[str, Mapping[str, float]] = {
 
 _MEANINGLESS: Mapping[str, tuple[str, ...]] = {
     "arc": ("elevation", "rings"),
-    "dome": ("height",),
-    "fixed": ("elevation", "rings", "degrees", "count"),
-    "none": ("height", "rings", "traced"),
+    "dome": ("height", "around"),
+    "fixed": ("elevation", "rings", "degrees", "count", "around"),
+    "none": ("height", "rings", "traced", "around"),
 }
 """Keys that a kind of views does not know."""
 
@@ -57,6 +57,9 @@ class Views(Section):
     traced: Annotated[Annotated[int, Field(ge=0, le=1000)] | None, *AUTO] = None
     """Views between neighbouring maps that are traced, too, and fitted by what the maps' blend shows. "auto":
     where the maps are far apart, by `auto.quality`."""
+    around: Annotated[Annotated[int, Field(ge=0, le=1000)] | None, *AUTO] = None
+    """Views beside the arc, up to 8 degrees from a sample, to which its maps are fitted, too. "auto": where
+    the maps are near, by `auto.quality`."""
     rings: Annotated[int, Field(ge=1, le=1000)] = 3
     """Maps of a dome from its lowest to its highest elevation."""
     fov: Annotated[float, Field(gt=0, lt=180)] = 30.0

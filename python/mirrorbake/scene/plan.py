@@ -27,6 +27,7 @@ DECIDED_KEYS = (
     "maps.size",
     "trace.noise",
     "views.traced",
+    "views.around",
     "infer.passes",
     "infer.neighbours",
     "static.views",
@@ -35,7 +36,7 @@ DECIDED_KEYS = (
 have decisions on `shells.proxy`, too."""
 
 
-USUAL_WEIGHT = 3e-4
+USUAL_WEIGHT = 1e-4
 """λ for which the regulariser's other weights are meant where a plan decides it."""
 
 DecisionValue: TypeAlias = bool | int | float | str | list[dict[str, Any]]
@@ -183,7 +184,7 @@ class Plan:
                 "reflector": resolved("reflector", "parts"),
                 "maps": resolved("maps", "shared_distant"),
                 "trace": resolved("trace", "samples", "noise", "depth"),
-                "views": resolved("views", "traced"),
+                "views": resolved("views", "traced", "around"),
                 "infer": infer,
                 "static": resolved("static", "views"),
                 "shells": self.shell_sections,

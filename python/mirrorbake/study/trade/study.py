@@ -213,7 +213,7 @@ def shrunk(config: SceneConfig, longest_side: int) -> SceneConfig:
 _DECIDED = (
     *("reflector.parts", "trace.depth", "trace.samples", "trace.noise", "maps.distant"),
     "maps.shared_distant",
-    *("views.traced", "infer.passes", "infer.neighbours"),
+    *("views.traced", "views.around", "infer.passes", "infer.neighbours"),
 )
 """What all trials share of the plan; with them the local layer, if all parts have one or none has."""
 

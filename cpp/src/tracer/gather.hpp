@@ -38,8 +38,8 @@ inline Surface surface_near_corner(const World& world, const TriangleCorner& cor
   return surface_at(world.scene, world.rays, hit, -towards);
 }
 
-/// What a gather ray picks up: the light that diffuse surfaces reflect. Emission is left out, next-event
-/// estimation has it.
+/// What a gather ray picks up: the light that diffuse surfaces reflect. Emission is left out: next-event
+/// estimation has it, and `caustic_irradiance` that which mirrors show.
 struct Gathered {
   glm::vec3 radiance{0.0F};
   bool nothing = false;         ///< the ray left the scene

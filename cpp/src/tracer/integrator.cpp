@@ -129,6 +129,23 @@ bool specular_follows(const Surface& surface, const PathLimits& limits, int boun
   return surface.specular() && bounce <= limits.specular_depth;
 }
 
+// The random numbers of a vertex of a diffuse path.
+struct VertexNumbers {
+  const SampleStream& stream;
+  std::uint32_t first_dimension;
+  bool stratified;
+
+  VertexNumbers(const SampleStream& stream_, int bounce, int vertex)
+      : stream(stream_),
+        first_dimension(dimension_base(bounce, std::min(vertex, static_cast<int>(vertices_per_bounce) - 1))),
+        // It pays off where many samples share the vertices before: on the first two of a path.
+        stratified(vertex <= 2) {}
+
+  glm::vec2 operator()(std::uint32_t use) const {
+    return stratified ? stream.get(first_dimension + use) : stream.get_independent(first_dimension + use);
+  }
+};
+
 }  // namespace
 
 glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec2 u, bool share_with_cosine) {
@@ -222,38 +239,11 @@ glm::vec3 radiance(const LitWorld& lit, const Ray& first_ray, const Hit& first_h
 
 namespace {
 
-// The random numbers of a vertex of a diffuse path.
-struct VertexNumbers {
-  const SampleStream& stream;
-  std::uint32_t first_dimension;
-  bool stratified;
-
-  VertexNumbers(const SampleStream& stream_, int bounce, int vertex)
-      : stream(stream_),
-        first_dimension(dimension_base(bounce, std::min(vertex, static_cast<int>(vertices_per_bounce) - 1))),
-        // It pays off where many samples share the vertices before: on the first two of a path.
-        stratified(vertex <= 2) {}
-
-  glm::vec2 operator()(std::uint32_t use) const {
-    return stratified ? stream.get(first_dimension + use) : stream.get_independent(first_dimension + use);
-  }
-};
-
-// Radiance of the lights that a guided ray finds by way of specular surfaces alone, as an estimate of π⁻¹ ×
-// irradiance. Weighted (power heuristic) for a partner that follows the cosine, `guided_partner_weight`.
+// Radiance of the lights that `ray` finds by way of specular surfaces alone, times `throughput`.
 // `specular_bounces` were before.
-glm::vec3 guided_light(const LitWorld& lit, const Surface& start, CausticGuide::Cell cell,
-                       const PathLimits& limits, int specular_bounces, const VertexNumbers& numbers) {
-  const World& world = lit.world;
-  const glm::vec2 u = numbers(guide_dimension);
-  if (!(u.x < cell.rays)) return glm::vec3(0.0F);
-  const glm::vec3 direction = lit.indirect.guide.sample(cell, {u.x / cell.rays, u.y});
-  const float pdf = cosine_pdf(start, direction);
-  const float guided = cell.rays * lit.indirect.guide.pdf(cell, direction);
-  if (!(pdf > 0.0F) || !(guided > 0.0F)) return glm::vec3(0.0F);
+glm::vec3 caustic_light(const World& world, Ray ray, glm::vec3 throughput, const PathLimits& limits,
+                        int specular_bounces, const VertexNumbers& numbers) {
   glm::vec3 sum(0.0F);
-  glm::vec3 throughput(pdf / guided * power_heuristic(guided, pdf));
-  Ray ray{offset_origin(start, direction), direction};
   float lobe_pdf = 0.0F;
   for (int chain = 0;; ++chain) {
     const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
@@ -280,6 +270,21 @@ glm::vec3 guided_light(const LitWorld& lit, const Surface& start, CausticGuide::
   }
 }
 
+// What a guided ray brings: an estimate of π⁻¹ × irradiance, weighted (power heuristic) for a partner that
+// follows the cosine, `guided_partner_weight`.
+glm::vec3 guided_light(const LitWorld& lit, const Surface& start, CausticGuide::Cell cell,
+                       const PathLimits& limits, int specular_bounces, const VertexNumbers& numbers) {
+  const glm::vec2 u = numbers(guide_dimension);
+  if (!(u.x < cell.rays)) return glm::vec3(0.0F);
+  const glm::vec3 direction = lit.indirect.guide.sample(cell, {u.x / cell.rays, u.y});
+  const float pdf = cosine_pdf(start, direction);
+  const float guided = cell.rays * lit.indirect.guide.pdf(cell, direction);
+  if (!(pdf > 0.0F) || !(guided > 0.0F)) return glm::vec3(0.0F);
+  return caustic_light(lit.world, {offset_origin(start, direction), direction},
+                       glm::vec3(pdf / guided * power_heuristic(guided, pdf)), limits, specular_bounces,
+                       numbers);
+}
+
 // Weight of what `guided_light` finds as well, for a ray along the cosine.
 float guided_partner_weight(const LitWorld& lit, CausticGuide::Cell cell, glm::vec3 direction, float pdf) {
   return cell.rays > 0.0F ? power_heuristic(pdf, cell.rays * lit.indirect.guide.pdf(cell, direction)) : 1.0F;
@@ -301,6 +306,24 @@ bool survives(glm::vec3& throughput, int vertex, float random) {
 }
 
 }  // namespace
+
+glm::vec3 caustic_irradiance(const World& world, const CausticGuide& guide, const Surface& surface,
+                             const SampleStream& stream) {
+  // Some rays follow the cosine, for light from where the guide knows of none.
+  constexpr float kCosineShare = 0.1F;
+  const CausticGuide::Cell cell = guide.cell(surface.position);
+  if (!(cell.rays > 0.0F)) return glm::vec3(0.0F);
+  const VertexNumbers numbers(stream, 0, 0);
+  const glm::vec2 u = numbers(guide_dimension);
+  const glm::vec3 direction = u.x < kCosineShare
+                                  ? sample_cosine_hemisphere(Frame(surface.normal), {u.x / kCosineShare, u.y})
+                                  : guide.sample(cell, {(u.x - kCosineShare) / (1.0F - kCosineShare), u.y});
+  const float pdf = cosine_pdf(surface, direction);
+  if (!(pdf > 0.0F)) return glm::vec3(0.0F);
+  const float chosen = kCosineShare * pdf + (1.0F - kCosineShare) * guide.pdf(cell, direction);
+  return std::numbers::pi_v<float> * caustic_light(world, {offset_origin(surface, direction), direction},
+                                                   glm::vec3(pdf / chosen), PathLimits{}, 0, numbers);
+}
 
 glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const PathLimits& limits,
                                 const SampleStream& stream, int bounce, Effort effort) {

@@ -2,6 +2,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "caustic_guide.hpp"
 #include "irradiance_cache.hpp"
 #include "lights.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
@@ -61,6 +62,11 @@ glm::vec3 radiance(const LitWorld& lit, const Ray& ray, const Hit& hit, const Pa
 /// Irradiance from all lights on the surface's side, by one sample of next-event estimation. With
 /// `share_with_cosine` it is weighted (power heuristic) for a partner that samples the cosine.
 glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec2 u, bool share_with_cosine);
+
+/// Irradiance that the lights send by way of specular surfaces alone, where the guide knows of any, by one
+/// ray.
+glm::vec3 caustic_irradiance(const World& world, const CausticGuide& guide, const Surface& surface,
+                             const SampleStream& stream);
 
 /// Radiance that a diffuse path finds which leaves `surface` in a random direction: an estimate of π⁻¹ ×
 /// irradiance. Includes the partner of next-event estimation of some `effort` at `surface`.

@@ -20,8 +20,8 @@ namespace {
 constexpr int kProbeRays = 16;
 // Later passes gather light that is dimmer and smoother than the first one's: a quarter of the rays will do.
 constexpr int kLaterShare = 4;
-// Points around a vertex from which its rays start in turn.
-constexpr std::uint32_t kStartPoints = 16;
+// Caustics are as sharp as the mirrors: as many times the rays of the first pass, where there are any.
+constexpr int kCausticShare = 4;
 // Corners of a flat-shaded mesh share a slot if their faces differ by less than acos(0.999) = 2.6°.
 constexpr float kSameFace = 0.999F;
 // Slots of an object up to which each takes all of its rays; beyond it the object's rays are as many as these
@@ -40,9 +40,10 @@ IrradianceCache& IrradianceCache::operator=(const IrradianceCache&) = default;
 IrradianceCache::IrradianceCache(IrradianceCache&&) noexcept = default;
 IrradianceCache& IrradianceCache::operator=(IrradianceCache&&) noexcept = default;
 
-IrradianceCache::IrradianceCache(const World& world, const TracerOptions& options) : seed_(options.seed) {
+IrradianceCache::IrradianceCache(const World& world, const CausticGuide& guide, const TracerOptions& options)
+    : seed_(options.seed) {
   assign_slots(world);
-  gather(world, options);
+  gather(world, guide, options);
 }
 
 void IrradianceCache::assign_slots(const World& world) {
@@ -117,20 +118,40 @@ glm::vec3 IrradianceCache::interpolate(const Sides& values, const Surface& surfa
   return tracing::interpolate(value, {slot[0], slot[1], slot[2]}, surface.barycentric);
 }
 
-template <typename IrradianceAt>
-IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std::size_t slot, int side,
-                                                         int rays, const IrradianceAt& irradiance_at) const {
+std::array<Surface, IrradianceCache::kStartPoints> IrradianceCache::start_points(const World& world,
+                                                                                 std::size_t slot, int side,
+                                                                                 std::uint32_t count) const {
   const std::uint32_t first = first_corner_[slot];
-  const std::uint32_t count = first_corner_[slot + 1] - first;
-  const std::uint64_t number = 2 * slot + static_cast<std::size_t>(side);
+  const std::uint32_t corners = first_corner_[slot + 1] - first;
   std::array<Surface, kStartPoints> starts;
-  const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
-  for (std::uint32_t i = 0; i < start_count; ++i) {
-    const SampleStream stream = sample_stream(seed_, number, i);
-    const TriangleCorner& corner = corners_[first + i % count];
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const SampleStream stream = sample_stream(seed_, side_number(slot, side), i);
+    const TriangleCorner& corner = corners_[first + i % corners];
     const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
     starts[i] = surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), side == 0 ? n : -n);
   }
+  return starts;
+}
+
+glm::vec3 IrradianceCache::slot_caustics(const World& world, const CausticGuide& guide, std::size_t slot,
+                                         int side, int rays) const {
+  const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
+  const std::array<Surface, kStartPoints> starts = start_points(world, slot, side, start_count);
+  glm::vec3 sum(0.0F);
+  for (int r = 0; r < rays; ++r) {
+    const auto index = static_cast<std::uint32_t>(r);
+    sum += caustic_irradiance(world, guide, starts[index % start_count],
+                              sample_stream(seed_, side_number(slot, side), index));
+  }
+  return sum / static_cast<float>(rays);
+}
+
+template <typename IrradianceAt>
+IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std::size_t slot, int side,
+                                                         int rays, const IrradianceAt& irradiance_at) const {
+  const std::uint64_t number = side_number(slot, side);
+  const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
+  const std::array<Surface, kStartPoints> starts = start_points(world, slot, side, start_count);
 
   SlotGather result;
   int traced = 0;
@@ -162,7 +183,7 @@ IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std
   return result;
 }
 
-void IrradianceCache::gather(const World& world, const TracerOptions& options) {
+void IrradianceCache::gather(const World& world, const CausticGuide& guide, const TracerOptions& options) {
   const std::size_t slots = first_corner_.size() - 1;
   std::vector<std::uint8_t> buried[2];
   std::vector<std::uint8_t> given_up[2];
@@ -191,6 +212,10 @@ void IrradianceCache::gather(const World& world, const TracerOptions& options) {
                                                 : gather_slot(world, slot, side, own, indirect);
           found.side[side][slot] = gathered.irradiance;
           if (pass > 0) continue;
+          // Their bounce is gathered by the next pass.
+          if (!gathered.given_up) {
+            found.side[side][slot] += slot_caustics(world, guide, slot, side, kCausticShare * own);
+          }
           buried[side][slot] = gathered.buried ? 1 : 0;
           given_up[side][slot] = gathered.given_up ? 1 : 0;
         }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 #include <glm/vec3.hpp>
@@ -10,14 +11,16 @@
 namespace mirrorbake::tracing {
 
 struct World;
+class CausticGuide;
 struct TriangleCorner;
 
-/// Indirect irradiance at the corners of all diffuse triangles, one value per side (IndirectLight::cached).
+/// Indirect irradiance at the corners of all diffuse triangles, one value per side (IndirectLight::cached):
+/// light by way of specular or diffuse surfaces.
 ///
 /// Each pass gathers one more diffuse bounce: rays with a cosine distribution leave points around a vertex,
 /// and pick up the direct light (first pass) or the previous pass's irradiance where they land. A ray that
-/// lands on a mirror follows it a few bounces, but emission seen that way is left out: a gathered caustic
-/// would be noise. Vertices buried in another body see only the dark inside of it; they take the value of
+/// lands on a mirror follows it a few bounces, without the emission seen that way: rays that the guide aims
+/// find those caustics with less noise, in the first pass. Vertices buried in another body see only the dark inside of it; they take the value of
 /// their neighbours, or triangles that stick out of the body would fade to black.
 ///
 /// On an object of many vertices each one takes fewer rays and the mean with its neighbours, whose rays it
@@ -25,7 +28,7 @@ struct TriangleCorner;
 class IrradianceCache {
  public:
   IrradianceCache();
-  IrradianceCache(const World& world, const TracerOptions& options);
+  IrradianceCache(const World& world, const CausticGuide& guide, const TracerOptions& options);
   ~IrradianceCache();
   IrradianceCache(const IrradianceCache&);
   IrradianceCache& operator=(const IrradianceCache&);
@@ -37,12 +40,16 @@ class IrradianceCache {
 
  private:
   static constexpr std::uint32_t kNoSlot = ~0U;
+  static constexpr std::uint32_t kStartPoints = 16;  ///< of a slot, from which its rays start in turn
 
   /// Irradiance per slot: of the front and of the back side.
   struct Sides {
     std::vector<glm::vec3> side[2];
   };
 
+  static std::uint64_t side_number(std::size_t slot, int side) {
+    return 2 * slot + static_cast<std::size_t>(side);
+  }
   void assign_slots(const World& world);
   glm::vec3 interpolate(const Sides& values, const Surface& surface) const;
   /// One pass's irradiance on one side of a slot.
@@ -54,8 +61,13 @@ class IrradianceCache {
   template <typename IrradianceAt>
   SlotGather gather_slot(const World& world, std::size_t slot, int side, int rays,
                          const IrradianceAt& irradiance_at) const;
-  /// Adds up what the passes bring.
-  void gather(const World& world, const TracerOptions& options);
+  /// Random points around a slot's vertex, seen from one side; `count` ≤ kStartPoints.
+  std::array<Surface, kStartPoints> start_points(const World& world, std::size_t slot, int side,
+                                                 std::uint32_t count) const;
+  glm::vec3 slot_caustics(const World& world, const CausticGuide& guide, std::size_t slot, int side,
+                          int rays) const;
+  /// Adds up caustics and what the passes bring.
+  void gather(const World& world, const CausticGuide& guide, const TracerOptions& options);
   void fill_buried(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
   /// Takes means with the neighbours, buried ones left out, where slots have a share of the rays.
   void share_rays(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;

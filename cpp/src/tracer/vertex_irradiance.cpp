@@ -67,6 +67,7 @@ std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint
           found += std::numbers::pi_v<float> *
                    diffuse_path_radiance(state_->lit, start, limits, stream, 1, Effort::one);
         } else if (cached) {
+          found += caustic_irradiance(world, indirect.guide, start, stream);
           const glm::vec3 direction =
               sample_cosine_hemisphere(Frame(start.normal), stream.get(diffuse_dimension));
           if (glm::dot(direction, start.geometric_normal) > 0.0F) {

@@ -50,12 +50,12 @@ struct World {
 struct Indirect {
   Indirect(const World& world, const TracerOptions& options)
       : mode(options.indirect),
-        cache(mode == IndirectLight::cached ? IrradianceCache(world, options) : IrradianceCache()),
-        guide(mode == IndirectLight::path ? CausticGuide(world, options.seed) : CausticGuide()) {}
+        guide(mode == IndirectLight::none ? CausticGuide() : CausticGuide(world, options.seed)),
+        cache(mode == IndirectLight::cached ? IrradianceCache(world, guide, options) : IrradianceCache()) {}
 
   IndirectLight mode;
+  CausticGuide guide;     ///< empty if the mode is `none`
   IrradianceCache cache;  ///< empty unless the mode is `cached`
-  CausticGuide guide;     ///< empty unless the mode is `path`
 };
 
 /// All that the integrators need.

@@ -378,13 +378,52 @@ TEST(Light, ClosedFurnaceSumsTheGeometricSeries) {
     EXPECT_LT(got.error, 0.01);
   }
   {
-    // The cache follows its default three bounces, after the direct light.
+    // The cache follows its default six bounces, after the direct light.
     double expected = emission;
-    for (int i = 1; i <= 4; ++i) expected += emission * std::pow(albedo, i);
+    for (int i = 1; i <= 7; ++i) expected += emission * std::pow(albedo, i);
     const Tracer tracer(scene, indirect(IndirectLight::cached));
     const Estimate got = estimate(tracer.trace_beauty(camera, options));
     // 256 rays at each corner: the cache's own noise is common to neighbouring pixels.
     EXPECT_NEAR(got.mean, expected, 0.01);
+  }
+}
+
+// A lamp in a flat mirror lights a floor as its image behind the mirror would.
+TEST(Light, CacheHoldsCaustics) {
+  Scene scene;
+  constexpr float kCell = 0.1F;
+  constexpr int kCells = 20;  // along each side of the floor
+  TriangleMesh floor;
+  for (int i = 0; i < kCells; ++i) {
+    for (int j = 0; j < kCells; ++j) {
+      const glm::vec3 corner(-1.0F + kCell * static_cast<float>(i), 0, 1.0F - kCell * static_cast<float>(j));
+      const TriangleMesh cell = make_rectangle(corner, {kCell, 0, 0}, {0, 0, -kCell});
+      const auto first = static_cast<std::uint32_t>(floor.positions.size());
+      floor.positions.insert(floor.positions.end(), cell.positions.begin(), cell.positions.end());
+      for (const glm::uvec3& t : cell.triangles) floor.triangles.push_back(t + first);
+    }
+  }
+  const float albedo = 0.5F;
+  add_object(scene, floor, matte(glm::vec3(albedo)));
+  add_object(scene, make_rectangle({1, 0, -1}, {0, 0, 2}, {0, 2, 0}), mirror(glm::vec3(1.0F)));
+  SphereLight lamp;
+  lamp.centre = {0, 1, 0};
+  lamp.radius = 0.1F;
+  lamp.radiance = glm::vec3(10.0F);
+  scene.sphere_lights.push_back(lamp);
+  TracerOptions options = indirect(IndirectLight::cached);
+  options.cache_rays = 256;
+  const Tracer cached(scene, options);
+  const Tracer direct_only(scene, indirect(IndirectLight::none));
+  for (const glm::vec3 point : {glm::vec3(0.3F, 0, 0), glm::vec3(-0.4F, 0, 0.3F)}) {
+    const glm::vec3 to_image = glm::vec3(2, 1, 0) - point;
+    const double d2 = glm::dot(to_image, to_image);
+    const double irradiance = 10.0 * kPi * 0.01 / d2 / std::sqrt(d2);
+    const double expected = albedo / kPi * irradiance;
+    const double got = estimate(cached.trace_beauty(spot(point), {})).mean -
+                       estimate(direct_only.trace_beauty(spot(point), {})).mean;
+    // For the noise of some corners' rays, and interpolation over a tenth of a metre.
+    EXPECT_NEAR(got, expected, 0.03 * expected) << point.x;
   }
 }
 

@@ -23,8 +23,8 @@
 namespace mirrorbake {
 
 /// Light that reaches a diffuse surface by way of other diffuse surfaces. `none` drops it. `cached` gathers
-/// it once per vertex of the static scene and interpolates: noise-free, blurred over a triangle's size,
-/// without caustics (the glow of a lamp that a mirror throws on a wall). `path` follows random paths:
+/// it once per vertex of the static scene and interpolates: free of noise, and blurred over a triangle's size,
+/// caustics too (the glow of a lamp that a mirror throws on a wall). `path` follows random paths:
 /// unbiased, noisy. Direct light is sampled at every point in all three.
 enum class IndirectLight { none, cached, path };
 
@@ -37,10 +37,10 @@ struct EnumNames<IndirectLight> {
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
   /// Gather rays per vertex of the `cached` indirect light, 1…65536; a quarter of them after the first
-  /// bounce. Of an object of more than 16384 vertices each takes a share, down to a fifth, and shares its
+  /// bounce, four times as many for caustics. Of an object of more than 16384 vertices each takes a share, down to a fifth, and shares its
   /// neighbours'.
   int cache_rays = 64;
-  int cache_bounces = 3;   ///< diffuse bounces that `cached` follows, 1…16
+  int cache_bounces = 6;   ///< diffuse bounces that `cached` follows, 1…16
   std::uint64_t seed = 0;  ///< of the cache
 };
 

@@ -29,10 +29,12 @@ class Quality:
     """Views between maps that are far apart, in a cell of one axis; squared in one of two."""
     static: int
     """Views of the static set."""
+    background: int | None = None
+    """Samples of a pixel off the object's bounds, which no map is fitted to; None: as on the object."""
 
 
 QUALITIES: Mapping[str, Quality] = {
-    "draft": Quality(noise=0.0, passes=1, neighbours=0.0, around=0, traced=0, static=0),
+    "draft": Quality(noise=0.0, passes=1, neighbours=0.0, around=0, traced=0, static=0, background=4),
     "normal": Quality(noise=0.01, passes=2, neighbours=0.3, around=8, traced=1, static=64),
     "high": Quality(noise=0.005, passes=2, neighbours=0.3, around=16, traced=2, static=128),
 }

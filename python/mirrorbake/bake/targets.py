@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.quality import QUALITIES
 from mirrorbake.bake.renderers import MapsView, renderer_named
 from mirrorbake.pem.run_time import model_of
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
@@ -44,14 +45,62 @@ class TracedView:
     """Gets the renderer ready by whose pictures the view's rows are probed; None: they are analytic."""
 
 
-def few_samples(stage: Stage) -> Stage:
-    """Return a planned stage whose pixels all take `trace.samples`, however noisy they stay.
+def few_samples(stage: Stage, most: int | None = None) -> Stage:
+    """Return a planned stage whose pixels all take `trace.samples`, at most `most`, however noisy they stay.
 
     Of many views for one set of maps: where several show a texel, their noise is averaged, and further views
     are worth more than less noise.
     """
-    trace = stage.config.trace.model_copy(update={"noise": 0.0})
+    samples = stage.config.trace.samples
+    if most is not None and samples is not None:
+        samples = min(samples, most)
+    trace = stage.config.trace.model_copy(update={"noise": 0.0, "samples": samples})
     return replace(stage, config=stage.config.model_copy(update={"trace": trace}))
+
+
+def background_samples(stage: Stage) -> int | None:
+    """Per pixel off the object's bounds, by `auto.quality`; None: as many as on the object."""
+    return QUALITIES[stage.config.auto.quality].background
+
+
+def bounds(pixel: NDArray[np.integer], window: Window) -> Window | None:
+    """Return the rectangle around pixels, numbered row by row within a window; None around none."""
+    if not len(pixel):
+        return None
+    left, top, width, _ = window
+    x, y = pixel % width, pixel // width
+    return (
+        left + int(x.min()),
+        top + int(y.min()),
+        int(x.max() - x.min()) + 1,
+        int(y.max() - y.min()) + 1,
+    )
+
+
+def pieces(window: Window, inner: Window | None) -> Iterator[tuple[Window, bool]]:
+    """Cut a window into rectangles, and tell which is the inner one, with a pixel around it.
+
+    Parameters
+    ----------
+    window, inner
+        The inner one within the window; None: the window is all there is.
+    """
+    if inner is None:
+        yield window, True
+        return
+    left, top, width, height = window
+    x0, y0 = max(inner[0] - 1, left), max(inner[1] - 1, top)
+    x1 = min(inner[0] + inner[2] + 1, left + width)
+    y1 = min(inner[1] + inner[3] + 1, top + height)
+    for rectangle, is_inner in (
+        ((left, top, width, y0 - top), False),
+        ((left, y0, x0 - left, y1 - y0), False),
+        ((x0, y0, x1 - x0, y1 - y0), True),
+        ((x1, y0, left + width - x1, y1 - y0), False),
+        ((left, y1, width, top + height - y1), False),
+    ):
+        if rectangle[2] > 0 and rectangle[3] > 0:
+            yield rectangle, is_inner
 
 
 class ViewTracer:
@@ -99,10 +148,8 @@ class ViewTracer:
         camera = stage.built.cameras.around(azimuth, elevation)
         pixel = np.asarray(self._lookups(stage, camera, (0, 0, 0, 0)).pixel)
         self._beside[key] = None
-        if len(pixel):
-            x, y = pixel % camera.width, pixel // camera.width
-            left, top = int(x.min()), int(y.min())
-            window = (left, top, int(x.max()) - left + 1, int(y.max()) - top + 1)
+        window = bounds(pixel, (0, 0, camera.width, camera.height))
+        if window is not None:
             self._beside[key] = self.stripe(stage, camera, window)
         return self._beside[key]
 
@@ -123,16 +170,21 @@ class ViewTracer:
     def _traced(
         self, stage: Stage, camera: _core.Camera, window: Window, lookups: _core.SurfaceSamples
     ) -> TracedView:
-        targets = self._targets(window[2], window[3])
-        bands = []
-        for y, traced in self._bands(stage, camera, window):
-            targets.add(traced.samples, 0, y)
-            bands.append(images_of_trace(traced))
+        left, top, width, height = window
+        targets = self._targets(width, height)
         images = ViewImages(
-            np.concatenate([band.object for band in bands]),
-            np.concatenate([band.coverage for band in bands]),
-            np.concatenate([band.background for band in bands]),
+            np.empty((height, width, 3), np.float32),
+            np.empty((height, width), np.float32),
+            np.empty((height, width, 3), np.float32),
         )
+        background = background_samples(stage)
+        object_at = None if background is None else bounds(np.asarray(lookups.pixel), window)
+        for rectangle, on_object in pieces(window, object_at):
+            piece = stage if on_object or background is None else few_samples(stage, background)
+            for band, traced in self._bands(piece, camera, rectangle):
+                x, y = band[0] - left, band[1] - top
+                targets.add(traced.samples, x, y)
+                images.put(x, y, images_of_trace(traced))
         return TracedView(lookups, targets, images, self._draw(stage, camera, window))
 
     def _draw(self, stage: Stage, camera: _core.Camera, window: Window) -> Callable[[], Draw] | None:
@@ -145,12 +197,12 @@ class ViewTracer:
 
     def _bands(
         self, stage: Stage, camera: _core.Camera, window: Window
-    ) -> Iterator[tuple[int, _core.LayerTrace]]:
+    ) -> Iterator[tuple[Window, _core.LayerTrace]]:
         left, top, width, height = window
         rows = max(1, BATCH // (width * stage.options.samples_per_pixel))
         for y in range(0, height, rows):
             band = (left, top + y, width, min(rows, height - y))
-            yield y, stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(band))
+            yield band, stage.tracer.trace_layers(camera, stage.built.reflector, stage.options_of(band))
 
     def _lookups(self, stage: Stage, camera: _core.Camera, window: Window) -> _core.SurfaceSamples:
         return stage.tracer.trace_visibility(

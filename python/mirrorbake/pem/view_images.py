@@ -23,6 +23,14 @@ class ViewImages:
     background: FloatArray
     """(H, W, 3) radiance of the others, times their fraction."""
 
+    def put(self, x: int, y: int, part: ViewImages) -> None:
+        """Write images of a part of the view, whose top left pixel is (x, y), in place."""
+        height, width = part.coverage.shape
+        place = np.s_[y : y + height, x : x + width]
+        self.object[place] = part.object
+        self.coverage[place] = part.coverage
+        self.background[place] = part.background
+
     def composite(self, object_radiance: FloatArray) -> FloatArray:
         """The whole picture with another rendering (H, W, 3) of the object in it."""
         return self.background + self.coverage[..., None] * object_radiance

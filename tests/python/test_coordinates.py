@@ -107,6 +107,8 @@ def scene(folder: Path, at: tuple[float, float, float], height: float, reflector
         "maps": {"size": 32, "distant": "box"},
         "trace": {"samples": 16, "depth": 2, "indirect": "none"},
         "auto": {"quality": "draft"},
+        # Texels that few rays see follow the roundings the less, the more their neighbours hold them.
+        "infer": {"smoothness": 3e-4, "level_agreement": 3e-4, "prior_weight": 3e-4, "tolerance": 1e-3},
     }
 
 

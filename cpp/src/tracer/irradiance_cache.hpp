@@ -20,8 +20,9 @@ struct TriangleCorner;
 /// Each pass gathers one more diffuse bounce: rays with a cosine distribution leave points around a vertex,
 /// and pick up the direct light (first pass) or the previous pass's irradiance where they land. A ray that
 /// lands on a mirror follows it a few bounces, without the emission seen that way: rays that the guide aims
-/// find those caustics with less noise, in the first pass. Vertices buried in another body see only the dark inside of it; they take the value of
-/// their neighbours, or triangles that stick out of the body would fade to black.
+/// find those caustics with less noise, in the first pass. Vertices buried in another body see only the dark
+/// inside of it; they take the value of their neighbours, or triangles that stick out of the body would fade
+/// to black.
 ///
 /// On an object of many vertices each one takes fewer rays and the mean with its neighbours, whose rays it
 /// shares: what is gathered is as noisy as elsewhere, and blurred over distances that are small there.

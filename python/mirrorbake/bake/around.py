@@ -53,7 +53,7 @@ def places_around(cameras: Cameras, point: Point, count: int) -> list[PlaceAroun
     >>> from mirrorbake.scene.cameras import Cameras
     >>> arc = Cameras("arc", (0.0, 0.0, 0.0), 1.0, 0.36, 20.0, 4.0, 30.0, (8, 8))
     >>> len(places_around(arc, (0.0,), 8)), len(places_around(arc, (1.0,), 0))
-    (8, 0)
+    (6, 0)
     """
     azimuth, elevation = cameras.angles_of(cameras.eye(point))
     if count <= 0:

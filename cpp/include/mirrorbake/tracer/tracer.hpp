@@ -23,9 +23,9 @@
 namespace mirrorbake {
 
 /// Light that reaches a diffuse surface by way of other diffuse surfaces. `none` drops it. `cached` gathers
-/// it once per vertex of the static scene and interpolates: free of noise, and blurred over a triangle's size,
-/// caustics too (the glow of a lamp that a mirror throws on a wall). `path` follows random paths:
-/// unbiased, noisy. Direct light is sampled at every point in all three.
+/// it once per vertex of the static scene and interpolates: free of noise, blurred over a triangle's size,
+/// caustics too (the glow of a lamp that a mirror throws on a wall). `path` follows random paths: unbiased,
+/// noisy. Direct light is sampled at every point in all three.
 enum class IndirectLight { none, cached, path };
 
 template <>
@@ -37,8 +37,8 @@ struct EnumNames<IndirectLight> {
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
   /// Gather rays per vertex of the `cached` indirect light, 1…65536; a quarter of them after the first
-  /// bounce, four times as many for caustics. Of an object of more than 16384 vertices each takes a share, down to a fifth, and shares its
-  /// neighbours'.
+  /// bounce, four times as many for caustics. Of an object of more than 16384 vertices each takes a share,
+  /// down to a fifth, and shares its neighbours'.
   int cache_rays = 64;
   int cache_bounces = 6;   ///< diffuse bounces that `cached` follows, 1…16
   std::uint64_t seed = 0;  ///< of the cache

@@ -1,0 +1,174 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "light_estimates.hpp"
+#include "scenes.hpp"
+
+// Light that arrives by way of other surfaces: the cache and paths.
+namespace mirrorbake {
+namespace {
+
+using test::add_object;
+using test::constant_environment;
+using test::estimate;
+using test::Estimate;
+using test::floor_at;
+using test::indirect;
+using test::kPi;
+using test::matte;
+using test::mirror;
+using test::spot;
+
+// Closed furnace: walls that emit e and reflect a hold the radiance e (1 + a + a² + …).
+TEST(IndirectLight, ClosedFurnaceSumsTheGeometricSeries) {
+  const float emission = 0.7F;
+  const double albedo = 0.5;
+  Scene scene;
+  Material wall = matte(glm::vec3(static_cast<float>(albedo)));
+  wall.emission = glm::vec3(emission);
+  TriangleMesh sphere = make_sphere(glm::vec3(0.0F), 1.0F, 32);
+  for (glm::uvec3& t : sphere.triangles) std::swap(t.y, t.z);  // facing inwards
+  sphere.normals.clear();  // flat: interpolated normals lose what lies between them and the facets
+  add_object(scene, sphere, wall);
+  Camera camera;
+  camera.eye = {0.1F, 0.2F, 0.3F};
+  camera.target = {0, 0, -1};
+  camera.width = camera.height = 32;
+  TraceOptions options;
+  options.samples_per_pixel = 64;
+  options.max_diffuse_depth = 3;
+  {
+    // Next-event estimation adds the bounce that ends the path: 1 + 3 diffuse bounces in all.
+    double expected = emission;
+    for (int i = 1; i <= 4; ++i) expected += emission * std::pow(albedo, i);
+    const Tracer tracer(scene, indirect(IndirectLight::path));
+    const Estimate got = estimate(tracer.trace_beauty(camera, options));
+    EXPECT_NEAR(got.mean, expected, 4.0 * got.error + 1e-4);
+    EXPECT_LT(got.error, 0.01);
+  }
+  {
+    // The cache follows its default six bounces, after the direct light.
+    double expected = emission;
+    for (int i = 1; i <= 7; ++i) expected += emission * std::pow(albedo, i);
+    const Tracer tracer(scene, indirect(IndirectLight::cached));
+    const Estimate got = estimate(tracer.trace_beauty(camera, options));
+    // 256 rays at each corner: the cache's own noise is common to neighbouring pixels.
+    EXPECT_NEAR(got.mean, expected, 0.01);
+  }
+}
+
+// A lamp in a flat mirror lights a floor as its image behind the mirror would.
+TEST(IndirectLight, CacheHoldsCaustics) {
+  Scene scene;
+  constexpr float kCell = 0.1F;
+  constexpr int kCells = 20;  // along each side of the floor
+  TriangleMesh floor;
+  for (int i = 0; i < kCells; ++i) {
+    for (int j = 0; j < kCells; ++j) {
+      const glm::vec3 corner(-1.0F + kCell * static_cast<float>(i), 0, 1.0F - kCell * static_cast<float>(j));
+      const TriangleMesh cell = make_rectangle(corner, {kCell, 0, 0}, {0, 0, -kCell});
+      const auto first = static_cast<std::uint32_t>(floor.positions.size());
+      floor.positions.insert(floor.positions.end(), cell.positions.begin(), cell.positions.end());
+      for (const glm::uvec3& t : cell.triangles) floor.triangles.push_back(t + first);
+    }
+  }
+  const float albedo = 0.5F;
+  add_object(scene, floor, matte(glm::vec3(albedo)));
+  add_object(scene, make_rectangle({1, 0, -1}, {0, 0, 2}, {0, 2, 0}), mirror(glm::vec3(1.0F)));
+  SphereLight lamp;
+  lamp.centre = {0, 1, 0};
+  lamp.radius = 0.1F;
+  lamp.radiance = glm::vec3(10.0F);
+  scene.sphere_lights.push_back(lamp);
+  TracerOptions options = indirect(IndirectLight::cached);
+  options.cache_rays = 256;
+  const Tracer cached(scene, options);
+  const Tracer direct_only(scene, indirect(IndirectLight::none));
+  for (const glm::vec3 point : {glm::vec3(0.3F, 0, 0), glm::vec3(-0.4F, 0, 0.3F)}) {
+    const glm::vec3 to_image = glm::vec3(2, 1, 0) - point;
+    const double d2 = glm::dot(to_image, to_image);
+    const double irradiance = 10.0 * kPi * 0.01 / d2 / std::sqrt(d2);
+    const double expected = albedo / kPi * irradiance;
+    const double got = estimate(cached.trace_beauty(spot(point), {})).mean -
+                       estimate(direct_only.trace_beauty(spot(point), {})).mean;
+    // For the noise of some corners' rays, and interpolation over a tenth of a metre.
+    EXPECT_NEAR(got, expected, 0.03 * expected) << point.x;
+  }
+}
+
+// The two ways to follow diffuse light agree where the cache can be exact: a finely cut open box.
+TEST(IndirectLight, CachedAndPathIndirectLightAgree) {
+  Scene scene;
+  const auto wall = [&](glm::vec3 corner, glm::vec3 u, glm::vec3 v, glm::vec3 albedo) {
+    constexpr int kCells = 12;
+    TriangleMesh mesh;
+    for (int j = 0; j <= kCells; ++j) {
+      for (int i = 0; i <= kCells; ++i) {
+        mesh.positions.push_back(corner + u * (static_cast<float>(i) / kCells) +
+                                 v * (static_cast<float>(j) / kCells));
+      }
+    }
+    for (unsigned j = 0; j < kCells; ++j) {
+      for (unsigned i = 0; i < kCells; ++i) {
+        const unsigned a = j * (kCells + 1) + i;
+        mesh.triangles.push_back({a, a + 1, a + kCells + 2});
+        mesh.triangles.push_back({a, a + kCells + 2, a + kCells + 1});
+      }
+    }
+    add_object(scene, mesh, matte(albedo));
+  };
+  wall({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, glm::vec3(0.7F));              // floor
+  wall({-1, 0, -1}, {2, 0, 0}, {0, 2, 0}, glm::vec3(0.7F, 0.5F, 0.3F));  // back
+  wall({-1, 0, 1}, {0, 0, -2}, {0, 2, 0}, glm::vec3(0.8F, 0.1F, 0.1F));  // left
+  RectangleLight light;
+  light.corner = {0.2F, 1.9F, 0.2F};
+  light.edge_u = {0.5F, 0, 0};
+  light.edge_v = {0, 0, 0.5F};
+  light.radiance = glm::vec3(20.0F);
+  scene.rectangle_lights.push_back(light);
+  TracerOptions cached = indirect(IndirectLight::cached);
+  cached.cache_bounces = 4;
+  cached.cache_rays = 512;
+  const Tracer with_cache(scene, cached);
+  const Tracer with_paths(scene, indirect(IndirectLight::path));
+  const Tracer direct_only(scene, indirect(IndirectLight::none));
+  for (glm::vec3 point : {glm::vec3(-0.6F, 0, -0.5F), glm::vec3(0.5F, 0, 0.1F)}) {
+    for (int channel = 0; channel < 3; ++channel) {
+      const double a = estimate(with_cache.trace_beauty(spot(point), {}), channel).mean;
+      const Estimate b = estimate(with_paths.trace_beauty(spot(point), {}), channel);
+      const double c = estimate(direct_only.trace_beauty(spot(point), {}), channel).mean;
+      // 3 % of the indirect light for the cache's noise at 512 rays and its interpolation over a sixth of a
+      // metre.
+      EXPECT_NEAR(a, b.mean, 4 * b.error + 0.03 * (b.mean - c)) << channel;
+      EXPECT_GT(b.mean - c, 0.02 * b.mean);
+    }
+  }
+}
+
+TEST(IndirectLight, VertexIrradianceOfAConstantSkyIsPi) {
+  Scene scene;
+  const int box = add_object(scene, make_sphere(glm::vec3(0.0F), 1.0F, 16), matte(glm::vec3(0.5F)));
+  const TriangleMesh& mesh = scene.objects[0].mesh;
+  std::vector<bool> used(mesh.positions.size(), false);  // the poles have vertices without a triangle
+  for (const glm::uvec3& t : mesh.triangles) used[t.x] = used[t.y] = used[t.z] = true;
+  scene.environment = constant_environment(1.0F);
+  for (IndirectLight mode : {IndirectLight::none, IndirectLight::cached, IndirectLight::path}) {
+    const Tracer tracer(scene, indirect(mode));
+    const std::vector<glm::vec3> e = tracer.vertex_irradiance(box, 1024, 1);
+    ASSERT_EQ(e.size(), mesh.positions.size());
+    double sum = 0;
+    for (std::size_t i = 0; i < e.size(); ++i) {
+      // Facets of 2π/16 rad hide up to 2 % of the sky above the interpolated normals' horizon.
+      EXPECT_NEAR(e[i].x, used[i] ? kPi : 0.0, 0.1 * kPi);
+      sum += e[i].x;
+    }
+    EXPECT_NEAR(sum / static_cast<double>(std::count(used.begin(), used.end(), true)), kPi, 0.03 * kPi);
+  }
+}
+
+}  // namespace
+}  // namespace mirrorbake

@@ -9,10 +9,18 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
+def is_sanitized(tree: Path) -> bool:
+    """Whether a build tree is one of sanitizers, which need the environment of their test preset."""
+    cache = tree / "CMakeCache.txt"
+    lines = cache.read_text().splitlines() if cache.is_file() else []
+    return any(line.startswith("MIRRORBAKE_SANITIZERS:") and not line.endswith("=") for line in lines)
+
+
 def find_program(name: str) -> Path | None:
-    """Return the newest build of a program: that of MIRRORBAKE_TOOLS, or of any build tree."""
+    """Return the newest build of a program: that of MIRRORBAKE_TOOLS, or of any tree without sanitizers."""
     named = os.environ.get("MIRRORBAKE_TOOLS")
-    folders = [*([Path(named)] if named else []), *(ROOT / "build").glob("*/cpp/tools")]
+    trees = [tree for tree in (ROOT / "build").glob("*") if not is_sanitized(tree)]
+    folders = [*([Path(named)] if named else []), *(tree / "cpp" / "tools" for tree in trees)]
     found = [folder / name for folder in folders if (folder / name).is_file()]
     return max(found, key=lambda path: path.stat().st_mtime, default=None)
 

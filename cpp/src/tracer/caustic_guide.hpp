@@ -28,6 +28,8 @@ class CausticGuide {
   CausticGuide() = default;
   CausticGuide(const World& world, std::uint64_t seed);
 
+  bool knows_nothing() const { return grid_.empty(); }
+
   /// Bins of directions: the octahedral map, cut into squares.
   static constexpr int kSide = 40;
   static constexpr int kBins = kSide * kSide;

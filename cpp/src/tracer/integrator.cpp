@@ -129,23 +129,6 @@ bool specular_follows(const Surface& surface, const PathLimits& limits, int boun
   return surface.specular() && bounce <= limits.specular_depth;
 }
 
-// The random numbers of a vertex of a diffuse path.
-struct VertexNumbers {
-  const SampleStream& stream;
-  std::uint32_t first_dimension;
-  bool stratified;
-
-  VertexNumbers(const SampleStream& stream_, int bounce, int vertex)
-      : stream(stream_),
-        first_dimension(dimension_base(bounce, std::min(vertex, static_cast<int>(vertices_per_bounce) - 1))),
-        // It pays off where many samples share the vertices before: on the first two of a path.
-        stratified(vertex <= 2) {}
-
-  glm::vec2 operator()(std::uint32_t use) const {
-    return stratified ? stream.get(first_dimension + use) : stream.get_independent(first_dimension + use);
-  }
-};
-
 }  // namespace
 
 glm::vec3 direct_irradiance(const World& world, const Surface& surface, glm::vec2 u, bool share_with_cosine) {
@@ -238,6 +221,23 @@ glm::vec3 radiance(const LitWorld& lit, const Ray& first_ray, const Hit& first_h
 }
 
 namespace {
+
+// The random numbers of a vertex of a diffuse path.
+struct VertexNumbers {
+  const SampleStream& stream;
+  std::uint32_t first_dimension;
+  bool stratified;
+
+  VertexNumbers(const SampleStream& stream_, int bounce, int vertex)
+      : stream(stream_),
+        first_dimension(dimension_base(bounce, std::min(vertex, static_cast<int>(vertices_per_bounce) - 1))),
+        // It pays off where many samples share the vertices before: on the first two of a path.
+        stratified(vertex <= 2) {}
+
+  glm::vec2 operator()(std::uint32_t use) const {
+    return stratified ? stream.get(first_dimension + use) : stream.get_independent(first_dimension + use);
+  }
+};
 
 // Radiance of the lights that `ray` finds by way of specular surfaces alone, times `throughput`.
 // `specular_bounces` were before.

@@ -135,6 +135,7 @@ std::array<Surface, IrradianceCache::kStartPoints> IrradianceCache::start_points
 
 glm::vec3 IrradianceCache::slot_caustics(const World& world, const CausticGuide& guide, std::size_t slot,
                                          int side, int rays) const {
+  if (guide.knows_nothing()) return glm::vec3(0.0F);
   const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
   const std::array<Surface, kStartPoints> starts = start_points(world, slot, side, start_count);
   glm::vec3 sum(0.0F);

@@ -178,10 +178,10 @@ class ViewTracer:
             np.empty((height, width, 3), np.float32),
         )
         background = background_samples(stage)
+        elsewhere = stage if background is None else few_samples(stage, background)
         object_at = None if background is None else bounds(np.asarray(lookups.pixel), window)
         for rectangle, on_object in pieces(window, object_at):
-            piece = stage if on_object or background is None else few_samples(stage, background)
-            for band, traced in self._bands(piece, camera, rectangle):
+            for band, traced in self._bands(stage if on_object else elsewhere, camera, rectangle):
                 x, y = band[0] - left, band[1] - top
                 targets.add(traced.samples, x, y)
                 images.put(x, y, images_of_trace(traced))

@@ -438,7 +438,10 @@ def test_an_object_that_covers_no_pixel_has_no_figures(tmp_path: Path) -> None:
 
 def made_up(place: str, pem: float | None, ceiling: float = 40.0) -> ViewFigures:
     metrics: dict[str, Any] = {metric: {} for metric in METRICS}
-    metrics["psnr"] = {"pem": {"reference": pem}, "static_infinite": {"reference": 20.0}}
+    metrics["psnr"] = {
+        "pem": {"web": pem, "reference": pem},
+        "static_infinite": {"web": 20.0, "reference": 20.0},
+    }
     return ViewFigures(place, 0.0, (0.0,), ceiling, 64, 1.0, metrics)
 
 
@@ -453,6 +456,8 @@ def test_the_table_shows_means_by_place_and_leaves_out_what_does_not_exist() -> 
     assert "28.00" in rows["half-way between two"]
     assert "–" in rows["1° past the end of the arc"]
     assert "geometry" not in text
+    # What maps are inferred for by default comes first.
+    assert text.index("run time web ") < text.index("run time reference ")
 
 
 def test_what_is_infinite_is_null_in_json() -> None:

@@ -116,15 +116,23 @@ def _words(used: bool, apart: str, several: bool, how: str) -> str:
     return f"{apart}, views around are fitted {how}" if used else f"{apart}, no further views are fitted"
 
 
+def _no_further_views(stage: Stage) -> str | None:
+    """Why a scene can have no views but those that its maps stand for; None: it can."""
+    if stage.config.infer.fit != "display":
+        return 'infer.fit = "layers" has none'
+    if stage.space.changes_scene:
+        return "the scene changes"
+    if stage.config.infer.matrix == "probed":
+        return "each of them would take pictures of its own"
+    return None
+
+
 def _around(stage: Stage, quality: Quality, *, near: bool) -> tuple[int, str]:
     if stage.config.views.kind != "arc":
         return 0, "there is no arc beside which they would be"
-    if stage.config.infer.fit != "display":
-        return 0, 'infer.fit = "layers" has none'
-    if stage.space.changes_scene:
-        return 0, "the scene changes"
-    if stage.config.infer.matrix == "probed":
-        return 0, "each of them would take pictures of its own"
+    refusal = _no_further_views(stage)
+    if refusal is not None:
+        return 0, refusal
     if not near:
         return 0, "maps are far apart, or there is but one"
     if quality.around == 0:
@@ -135,12 +143,9 @@ def _around(stage: Stage, quality: Quality, *, near: bool) -> tuple[int, str]:
 def _static(stage: Stage, quality: Quality) -> tuple[int, str]:
     if stage.config.views.kind == "none":
         return 0, "the PEM is a static set itself"
-    if stage.config.infer.fit != "display":
-        return 0, 'infer.fit = "layers" has none'
-    if stage.space.changes_scene:
-        return 0, "the scene changes"
-    if stage.config.infer.matrix == "probed":
-        return 0, "each of its views would take pictures of its own"
+    refusal = _no_further_views(stage)
+    if refusal is not None:
+        return 0, refusal
     if quality.static == 0:
         return 0, "far from the samples the nearest one is drawn"
     return quality.static, "far from the samples maps of a dome are drawn"

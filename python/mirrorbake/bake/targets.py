@@ -77,6 +77,15 @@ def bounds(pixel: NDArray[np.integer], window: Window) -> Window | None:
     )
 
 
+def widened(inner: Window, margin: int, window: Window) -> Window:
+    """Return a rectangle with some pixels more on each side, as far as a window holds them."""
+    left, top, width, height = window
+    x0, y0 = max(inner[0] - margin, left), max(inner[1] - margin, top)
+    x1 = min(inner[0] + inner[2] + margin, left + width)
+    y1 = min(inner[1] + inner[3] + margin, top + height)
+    return (x0, y0, x1 - x0, y1 - y0)
+
+
 def pieces(window: Window, inner: Window | None) -> Iterator[tuple[Window, bool]]:
     """Cut a window into rectangles, and tell which is the inner one, with a pixel around it.
 
@@ -89,9 +98,8 @@ def pieces(window: Window, inner: Window | None) -> Iterator[tuple[Window, bool]
         yield window, True
         return
     left, top, width, height = window
-    x0, y0 = max(inner[0] - 1, left), max(inner[1] - 1, top)
-    x1 = min(inner[0] + inner[2] + 1, left + width)
-    y1 = min(inner[1] + inner[3] + 1, top + height)
+    x0, y0, across, down = widened(inner, 1, window)
+    x1, y1 = x0 + across, y0 + down
     for rectangle, is_inner in (
         ((left, top, width, y0 - top), False),
         ((left, y0, x0 - left, y1 - y0), False),

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.targets import bounds, widened
 from mirrorbake.errors import StoreError
 from mirrorbake.evaluate.metrics import decibels, mean_squared_error
 from mirrorbake.pem.location import Location
@@ -138,6 +139,8 @@ def options_of(stage: Stage, samples: int, seed: int, window: Window) -> _core.T
         max_specular_depth=stage.options.max_specular_depth,
         seed=seed,
         window=list(window),
+        # Of the beauty alone is told here, which is the same however it is split, and cheapest unsplit.
+        shells=[_core.ShellRule("all")],
     )
 
 
@@ -145,14 +148,8 @@ def object_window(stage: Stage, camera: _core.Camera) -> Window:
     """The part of a view with the object in it and a margin around; of no size if it is not seen."""
     whole = (0, 0, camera.width, camera.height)
     seen = stage.tracer.trace_visibility(camera, stage.built.reflector, options_of(stage, 4, 0, whole))
-    pixel = np.unique(np.asarray(seen.pixel)).astype(np.int64)
-    if not len(pixel):
-        return (0, 0, 0, 0)
-    x, y = pixel % camera.width, pixel // camera.width
-    left, top = max(int(x.min()) - WINDOW_MARGIN, 0), max(int(y.min()) - WINDOW_MARGIN, 0)
-    right = min(int(x.max()) + 1 + WINDOW_MARGIN, camera.width)
-    bottom = min(int(y.max()) + 1 + WINDOW_MARGIN, camera.height)
-    return (left, top, right - left, bottom - top)
+    around = bounds(np.asarray(seen.pixel), whole)
+    return (0, 0, 0, 0) if around is None else widened(around, WINDOW_MARGIN, whole)
 
 
 def trace_reference(stage: Stage, camera: _core.Camera, window: Window, samples: int) -> Reference:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,13 +24,17 @@ from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.study.trade import maps, show
 from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of
 from mirrorbake.study.trade.drawing import FILTERS, Drawing, draw_samples
+from mirrorbake.study.trade.stability import combinations_of, compare, read_study
 from mirrorbake.study.trade.study import STUDY_NAME, Study, advice, shrunk, singles_of, study
-from mirrorbake.study.trade.trial import Trial, overridden
+from mirrorbake.study.trade.trial import Bench, Trial, overridden
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.stage import Stage
 
 SCENE: dict[str, Any] = {
     "reflector": {"object": "teapot", "subdivisions": 4, "parts": "split"},
@@ -262,7 +268,8 @@ def test_the_front_holds_what_no_cheaper_trial_is_as_good_as() -> None:
     # 29.75 dB for nearly twice the bytes of 29.7 is no gain that one would notice.
     assert by_bytes == [{"size": "64"}, {"size": "128"}, {"samples": "64"}]
     by_time = [trial.settings for trial in RESULT.front("bake_s")]
-    assert by_time == [{"size": "64"}, {"size": "128"}, {}, {"samples": "64"}]
+    # A hundredth less time, for which 64 texels take as long as 128, is no price of its own.
+    assert by_time == [{"size": "128"}, {}, {"samples": "64"}]
 
 
 def test_the_advice_says_what_to_save_and_what_to_pay_for() -> None:
@@ -271,6 +278,43 @@ def test_the_advice_says_what_to_save_and_what_to_pay_for() -> None:
     assert "2.0 dB more for twice the time to bake (samples of a target pixel: 64)" in words
     # 5 dB are no bargain.
     assert not any("25" in sentence or (": 64)" in sentence and "texels" in sentence) for sentence in words)
+
+
+# Another seed
+
+
+def test_a_study_differs_from_itself_in_nothing() -> None:
+    stability = compare(RESULT, RESULT)
+    assert stability.trials == 5
+    assert (stability.deviation, stability.largest) == (0.0, 0.0)
+    assert {cost: front.steps for cost, front in stability.fronts.items()} == {
+        "bytes_per_degree": 3,
+        "bake_s": 3,
+        "draw_ms": 1,
+    }
+    assert all(
+        front.kept == front.steps and front.off == front.ratio == 0 for front in stability.fronts.values()
+    )
+
+
+def test_another_front_is_drawn_by_the_figures_of_this_study() -> None:
+    other = replace(RESULT, trials=[*RESULT.trials[:2], replace(RESULT.trials[2], psnr={"on": 29.0})])
+    stability = compare(RESULT, other)
+    front = stability.fronts["bytes_per_degree"]
+    # The other has 64, 128 and the scene's own; 64 and 128 are kept, and 32 dB in place of 30 are missed.
+    assert (front.steps, front.kept) == (3, 2)
+    assert front.off == pytest.approx(2.0)
+    assert stability.largest == pytest.approx(3.0)
+    assert stability.deviation == pytest.approx(1.5)
+    assert "2 of 3 steps" in stability.words()[1]
+
+
+def test_a_front_without_its_cheapest_step_has_nothing_as_cheap() -> None:
+    small = RESULT.trials[1]
+    other = replace(RESULT, trials=[RESULT.trials[0], replace(small, bytes_per_degree=2e6)])
+    front = compare(RESULT, other).fronts["bytes_per_degree"]
+    assert math.isinf(front.off)
+    assert compare(RESULT, other).to_dict()["fronts"]["bytes_per_degree"]["off"] is None
 
 
 # A study
@@ -348,6 +392,21 @@ def test_a_study_keeps_to_its_time_and_goes_on(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["references", STUDY_NAME]
 
 
+def test_another_seed_tries_the_same_combinations(studied: tuple[Path, Study], tmp_path: Path) -> None:
+    folder, result = studied
+    other = read_study(folder)
+    assert sorted(map(str, combinations_of(other))) == sorted(map(str, combinations_of(result)))
+    seeded = parse_config({**SCENE, "trace": {**SCENE["trace"], "seed": 7}}, "scene")
+    again = study(seeded, tmp_path, STUDIED, again=combinations_of(other))
+    assert [trial.settings for trial in again.all] == [trial.settings for trial in result.all]
+    stability = compare(again, other)
+    assert stability.trials == len(result.all)
+    # Noise of targets of 8 samples and of pictures of 64×48 pixels; other random numbers, not the same ones.
+    assert 0.0 < stability.deviation < 1.5
+    with pytest.raises(InputError, match="expected a study"):
+        read_study(tmp_path / "none")
+
+
 def test_a_folder_with_another_study_is_refused(studied: tuple[Path, Study], tmp_path: Path) -> None:
     folder, _ = studied
     other = parse_config({**SCENE, "maps": {"size": 8, "distant": "box"}}, "scene")
@@ -392,6 +451,25 @@ def test_study_takes_a_scene_or_the_name_of_a_study(tmp_path: Path) -> None:
     assert "fresnel" in result.stdout
     missing = CliRunner().invoke(app, ["study", str(tmp_path / "none.toml")])
     assert missing.exit_code == 3
+
+
+def test_trials_seen_from_elsewhere_or_in_other_parts_keep_the_tracers_light(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(config: SceneConfig) -> Stage:
+        raise AssertionError("light was gathered again")
+
+    config = overridden(parse_config(SCENE, "scene"), DECIDED)
+    changes: list[dict[str, Any]] = [{"views.degrees": 4.0}, {"reflector.parts": "joined"}]
+    with Bench(config, tmp_path) as bench:
+        bench.stage(config)
+        with monkeypatch.context() as patched:
+            patched.setattr("mirrorbake.study.trade.trial.prepare_stage", refuse)
+            stages = [bench.stage(overridden(config, change)) for change in changes]
+    for stage in stages:
+        traced, fresh = (each.trace((0.0,)) for each in (stage, prepare_stage(stage.config)))
+        np.testing.assert_array_equal(traced.sample_beauty, fresh.sample_beauty)
+        np.testing.assert_array_equal(traced.samples.part, fresh.samples.part)
 
 
 def test_a_study_that_ends_early_has_looked_at_every_axis() -> None:

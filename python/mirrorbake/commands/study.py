@@ -70,6 +70,15 @@ def scene_command(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for results; goes on with a study in it.")
     ] = Path("out/study"),
+    against: Annotated[
+        Path | None,
+        typer.Option(
+            "--against",
+            metavar="DIR",
+            help="A study of the scene under another seed: tries its combinations, and says what of its "
+            "fronts stays. [default: none]",
+        ),
+    ] = None,
     assignments: Assignments = None,
     seed: Seed = None,
     json: Json = False,
@@ -80,20 +89,27 @@ def scene_command(
     `mirrorbake study SCENE.toml` is short for it.
     """
     from mirrorbake.study.trade import show
+    from mirrorbake.study.trade.stability import combinations_of, compare, read_study
     from mirrorbake.study.trade.study import advice, study
 
     config = scene_config(scene, assignments, None, None, None, None, seed)
     names = [name.strip() for name in axes.split(",") if name.strip()]
+    other = None if against is None else read_study(against)
+    again = None if other is None else combinations_of(other)
     with _core.ThreadLimit(threads), progress() as add_bar:
-        result = study(config, out, names, minutes, add_bar("study"), longest_side=pixels)
+        result = study(config, out, names, minutes, add_bar("study"), longest_side=pixels, again=again)
     show.plot(result, out / show.PLOT_NAME)
+    stability = None if other is None else compare(result, other)
     if json:
-        typer.echo(json_module.dumps(show.as_json(result)))
+        content = show.as_json(result)
+        if stability is not None:
+            content["stability"] = stability.to_dict()
+        typer.echo(json_module.dumps(content))
     else:
         console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
         for table in show.tables(result):
             console.print(table)
-        for words in advice(result):
+        for words in [*advice(result), *(() if stability is None else stability.words())]:
             console.print(f"- {words}", markup=False, soft_wrap=True)
     made = 1 + len(result.trials)
     if made < result.planned:

@@ -22,7 +22,7 @@ class KeptTraces:
 
     def __init__(self) -> None:
         self.saved_s = 0.0
-        """Seconds that tracing what was found here would have taken."""
+        """Seconds of processor time that tracing what was found here would have taken."""
         self._kept: OrderedDict[str, tuple[_core.LayerTrace, float]] = OrderedDict()
         self._bytes = 0
 
@@ -42,9 +42,9 @@ class KeptTraces:
             traced, seconds = self._kept[key]
             self.saved_s += seconds
             return traced
-        start = time.perf_counter()
+        start = time.process_time()
         traced = tracer.trace_layers(camera, reflector, options)
-        self._kept[key] = (traced, time.perf_counter() - start)
+        self._kept[key] = (traced, time.process_time() - start)
         self._bytes += SAMPLE_BYTES * len(traced.samples)
         while self._bytes > MOST_BYTES and len(self._kept) > 1:
             _, (oldest, _) = self._kept.popitem(last=False)

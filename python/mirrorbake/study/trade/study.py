@@ -40,6 +40,8 @@ COMBINATIONS = 15
 NOTICEABLE = 0.25
 """dB that a dearer choice has to gain to be on the front: the standard deviation of a figure under another
 seed, of the teapot in 96² pixels at 16 samples."""
+SAME_PRICE = 1.1
+"""Ratio of costs up to which a front has one step: what measuring them again can change."""
 MOST_COMBINED = 50_000
 
 COSTS = ("bytes_per_degree", "bake_s", "draw_ms")
@@ -68,17 +70,24 @@ class Study:
     def front(self, cost: str) -> list[Trial]:
         """Trials that no cheaper one is as good as: the Pareto front, cheapest first.
 
+        It has no steps of less than `NOTICEABLE`, nor two for the same price.
+
         Parameters
         ----------
         cost
             One of `COSTS`.
         """
         found: list[Trial] = []
-        best = -1e9
+        cheapest, best = -1.0, -1e9
         for trial in sorted(self.all, key=lambda trial: (getattr(trial, cost), -(trial.near or -1e9))):
-            if trial.near is not None and trial.near > best + NOTICEABLE:
+            if trial.near is None or trial.near <= best + NOTICEABLE:
+                continue
+            price, best = getattr(trial, cost), trial.near
+            if found and price <= SAME_PRICE * cheapest:
+                found[-1] = trial
+            else:
                 found.append(trial)
-                best = trial.near
+                cheapest = price
         return found
 
     def of_axis(self, axis: str) -> list[Trial]:
@@ -95,6 +104,7 @@ def study(
     combinations: int = COMBINATIONS,
     *,
     longest_side: int = LONGEST_SIDE,
+    again: Sequence[Mapping[str, str]] | None = None,
 ) -> Study:
     """Measure what a scene's choices cost and how far off they are.
 
@@ -119,6 +129,8 @@ def study(
     longest_side
         Pixels of the trials' pictures, the scene's if those are no larger; maps of a set size shrink
         with them.
+    again
+        Combinations to try, labels by axis, in place of those that the single axes foretell.
 
     Raises
     ------
@@ -137,10 +149,7 @@ def study(
     config = shrunk(config, longest_side)
     notebook = Notebook(folder / STUDY_NAME, _identity(config))
     stage = _studied(config)
-    chosen = [axis for axis in axes_of(stage) if not axes or axis.name in axes]
-    if axes and len(chosen) < len(set(axes)):
-        missing = sorted(set(axes) - {axis.name for axis in chosen})
-        raise OptionError(f"--axes {missing[0]}: this scene has no such choice")
+    chosen = _named(axes_of(stage), axes)
     singles = singles_of(chosen)
     planned = 1 + len(singles)
     trials: list[Trial] = []
@@ -161,7 +170,10 @@ def study(
         measure.share = SINGLES_SHARE
         try_all(singles, 1)
         measure.share = 1.0
-        promising = _promising(base, chosen, trials, combinations)
+        if again is None:
+            promising = _promising(base, chosen, trials, combinations)
+        else:
+            promising = _of_labels(chosen, again)
         planned += len(promising)
         try_all(promising, 1 + len(singles))
     report(planned, planned, f"{1 + len(trials)} trials")
@@ -170,6 +182,14 @@ def study(
     )
     notebook.finish(summary(result))
     return result
+
+
+def _named(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:
+    """Return the axes of some names, in their own order; without names all."""
+    missing = sorted(set(names) - {axis.name for axis in axes})
+    if missing:
+        raise OptionError(f"--axes {missing[0]}: this scene has no such choice")
+    return [axis for axis in axes if not names or axis.name in names]
 
 
 def singles_of(axes: Sequence[Axis]) -> list[dict[str, Setting]]:
@@ -256,6 +276,16 @@ def _identity(config: SceneConfig) -> str:
     inputs = {key: {**value, "path": None} for key, value in hash_inputs(config).items()}
     text = json.dumps([_core.version(), json.loads(config.model_dump_json()), inputs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _of_labels(axes: Sequence[Axis], again: Sequence[Mapping[str, str]]) -> list[dict[str, Setting]]:
+    """Return combinations by their labels; those that the axes do not have are left out."""
+    known = {axis.name: {setting.label: setting for setting in axis.settings} for axis in axes}
+    return [
+        {axis: known[axis][label] for axis, label in labels.items()}
+        for labels in again
+        if all(label in known.get(axis, ()) for axis, label in labels.items())
+    ]
 
 
 @dataclass(frozen=True)

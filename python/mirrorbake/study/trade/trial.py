@@ -19,6 +19,7 @@ from mirrorbake.pem.opened import OpenedPem
 from mirrorbake.pem.pyramid import coarse_end, pyramid_of, size_of
 from mirrorbake.pem.run_time import RunTime
 from mirrorbake.pem.store import PemStore
+from mirrorbake.scene.build import build_scene
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import Stage, prepare_stage
 from mirrorbake.study.trade.drawing import Drawing, draw, draw_samples
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mirrorbake.arrays import FloatArray
-    from mirrorbake.scene.config import SceneConfig
+    from mirrorbake.scene.config import Parts, SceneConfig
     from mirrorbake.study.trade.axes import Setting
 
 PLACES = ("on", "between", "off_5")
@@ -49,7 +50,8 @@ class Trial:
     bytes_per_degree: float
     """Of the maps, compressed as on disk, per degree of the arc (per view, if there is one view)."""
     bake_s: float
-    """Tracing, building matrices and solving per degree of the arc (per view, if there is one view)."""
+    """Of processor time, to trace, build matrices and solve, per degree of the arc (per view, if there is one
+    view)."""
     draw_ms: float
     """Of one core, to draw a frame from maps in memory, in software."""
     psnr: dict[str, float | None]
@@ -109,10 +111,12 @@ class Bench:
         self.config = config
         self._folder = folder
         self._stages: dict[str, Stage] = {}
+        self._lit: dict[str, tuple[Parts | None, _core.Tracer]] = {}
         self._traces = KeptTraces()
         self._own: tuple[OpenedPem, float] | None = None
         if stage is not None:
             self._stages[self._key(config)] = self._traces.keeping(stage)
+            self._lit[self._key(config, of_light=True)] = (config.reflector.parts, stage.tracer)
 
     def __enter__(self) -> Bench:
         """Begin."""
@@ -124,19 +128,38 @@ class Bench:
             shutil.rmtree(self._folder / name, ignore_errors=True)
 
     @staticmethod
-    def _key(config: SceneConfig) -> str:
+    def _key(config: SceneConfig, *, of_light: bool = False) -> str:
         data = json.loads(config.model_dump_json())
         for key in ("samples", "noise"):
             data["trace"].pop(key)
-        sections = ("reflector", "material", "surroundings", "views", "trace")
+        sections = ["reflector", "material", "surroundings", "trace"]
+        if of_light:
+            data["reflector"].pop("parts")
+        else:
+            sections.append("views")
         return json.dumps([data.get(section) for section in sections])
 
     def stage(self, config: SceneConfig) -> Stage:
         """The tracer of a scene, shared by all that are lit and seen alike."""
         key = self._key(config)
         if key not in self._stages:
-            self._stages[key] = self._traces.keeping(prepare_stage(config))
+            self._stages[key] = self._traces.keeping(self._prepared(config))
         return replace(self._stages[key], config=config)
+
+    def _prepared(self, config: SceneConfig) -> Stage:
+        """Prepare a scene; one that is seen from elsewhere, or in other parts, keeps its tracer's light."""
+        key = self._key(config, of_light=True)
+        if key not in self._lit:
+            stage = prepare_stage(config)
+            self._lit[key] = (config.reflector.parts, stage.tracer)
+            return stage
+        parts, tracer = self._lit[key]
+        built = build_scene(config)
+        if config.reflector.parts != parts:
+            names = built.scene.object_part_names(built.reflector)
+            materials = built.scene.object_part_materials(built.reflector)
+            tracer = tracer.with_parts(built.reflector, built.parts.tolist(), names, materials)
+        return Stage(config, built, tracer)
 
     def measure(self, settings: Mapping[str, Setting]) -> Trial:
         """Bake, draw and measure a combination of settings, by axis.
@@ -155,18 +178,15 @@ class Bench:
         return self._look(*self._bake(overridden(self.config, overrides), self._folder / "trial"), settings)
 
     def _bake(self, config: SceneConfig, directory: Path) -> tuple[OpenedPem, float]:
-        """Bake the samples that are looked at: the PEM, and seconds per sample."""
+        """Bake the samples that are looked at: the PEM, and seconds of processor time per sample."""
         shutil.rmtree(directory, ignore_errors=True)
         stage = self.stage(config)
-        before = self._traces.saved_s
         wanted = nodes_looked_at(config)
-        summary = bake(config, directory, None, stage, samples=wanted)
+        watch = _Stopwatch(self._traces)
+        summary = bake(config, directory, watch, stage, samples=wanted)
         store = PemStore.open(directory)
-        timings = [store.read_timings(index) for index in wanted]
-        seconds = sum(t.trace_s + t.build_s + t.solve_s for t in timings)
-        seconds = (seconds + self._traces.saved_s - before) / len(wanted)
         stage = stage.planned(summary.plan)
-        return OpenedPem(store, stage, RunTime(store, stage.built.triangles)), seconds
+        return OpenedPem(store, stage, RunTime(store, stage.built.triangles)), watch.seconds / len(wanted)
 
     def _look(self, opened: OpenedPem, seconds: float, settings: Mapping[str, Setting]) -> Trial:
         pem, size = _remapped(opened, settings.values())
@@ -204,6 +224,28 @@ class Bench:
             flip=errors,
             ceiling=ceiling,
         )
+
+
+class _Stopwatch:
+    """Measures the samples of a bake in processor time, so that nothing else that runs counts.
+
+    To be given to a bake as its progress: it starts again whenever nothing is done, last before the first
+    sample.
+    """
+
+    def __init__(self, traces: KeptTraces) -> None:
+        self._traces = traces
+        self._began = self._now()
+        self.seconds = 0.0
+        """That the samples took, or would have taken without the traces that were kept."""
+
+    def __call__(self, done: int, total: int, text: str) -> None:
+        if done == 0:
+            self._began = self._now()
+        self.seconds = self._now() - self._began
+
+    def _now(self) -> float:
+        return time.process_time() + self._traces.saved_s
 
 
 def _views(pem: OpenedPem) -> list[View]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from mirrorbake.scene.load import parse_config
-from mirrorbake.study.reach import BEYOND, INSIDE, measured
+from mirrorbake.scene.load import parse_config, parse_override
+from mirrorbake.study.reach import BEYOND, INSIDE, measured, scene_of_mesh
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -64,11 +64,26 @@ def test_a_dome_is_looked_at_inside(tmp_path: Path) -> None:
     assert all(look.noise > 10.0 for look in looks)
 
 
+def test_a_mesh_has_a_scene_of_its_own(tmp_path: Path) -> None:
+    overrides = [parse_override("static.views=0")]
+    silver = scene_of_mesh(str(tmp_path / "a.obj"), str(tmp_path / "sky.exr"), overrides)
+    assert silver.material is not None
+    assert silver.material.metal == "silver"
+    assert silver.surroundings.ground is not None
+    assert (silver.views.count, silver.views.degrees, silver.maps.size) == (3, 2.0, 64)
+    assert silver.static.views == 0
+    as_filed = scene_of_mesh(str(tmp_path / "a.glb"))
+    assert as_filed.material is None
+    assert as_filed.surroundings.panorama is None
+    assert as_filed.static.views == 24
+
+
 @pytest.mark.parametrize(
     ("module", "arguments", "status", "words"),
     [
         ("reach", ["missing.toml"], 3, "missing.toml: No such file"),
         ("reach", ["missing.toml", "--set", "nonsense"], 2, "nonsense"),
+        ("reach", [], 2, "expected SCENE.toml or --mesh FILE"),
         ("noise", ["--object", "missing.obj"], 3, "missing.obj"),
         ("noise", ["--bias", "--object", "missing.obj"], 2, "--bias is measured of the teapot"),
     ],

@@ -2,7 +2,8 @@
 
 `python -m mirrorbake.study.reach SCENE.toml ...` bakes each scene into a temporary folder and looks at it
 on a sample, half-way to the next, at places spread inside of a dome, and up to 30 degrees beyond the samples.
-Below each stands where it is least above its static set, and what its plan foretold.
+Below each stands where it is least above its static set, and what its plan foretold. With `--mesh FILE` it
+looks at an object in the furnished room, or with `--sky FILE` under a panorama on a ground.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,6 +48,20 @@ SEED_OFFSET = 0x0FF5_0000
 CONTENDERS = ("pem", "static_set", "static_infinite")
 TARGET_SAMPLES = 16
 """Of which the noise is told."""
+SCENE_OF_MESH: tuple[tuple[tuple[str, ...], Any], ...] = (
+    (("reflector", "height"), 0.2),
+    (("views", "start"), 21.0),
+    (("views", "degrees"), 2.0),
+    (("views", "count"), 3),
+    (("views", "size"), [128, 128]),
+    (("maps", "size"), 64),
+    (("trace", "noise"), 0.01),
+    (("trace", "most_samples"), 128),
+    (("static", "views"), 24),
+)
+"""Three samples 1 degree apart, in the room."""
+GROUND = ((("surroundings", "ground", "radius"), 0.3), (("surroundings", "ground", "albedo"), 0.4))
+"""Under a panorama."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +172,28 @@ class Reach:
         return min(known, default=None)
 
 
+def scene_of_mesh(
+    mesh: str, sky: str | None = None, overrides: Sequence[tuple[tuple[str, ...], Any]] = ()
+) -> SceneConfig:
+    """Return a small scene of a mesh, in silver if its file is an OBJ, else in its file's materials.
+
+    Parameters
+    ----------
+    mesh
+        An .obj, .gltf or .glb file.
+    sky
+        A panorama, above a ground on which the object stands; None: the furnished room.
+    overrides
+        Of `SCENE_OF_MESH`.
+    """
+    own: list[tuple[tuple[str, ...], Any]] = [*SCENE_OF_MESH, (("reflector", "mesh"), mesh)]
+    if Path(mesh).suffix.lower() == ".obj":
+        own.append((("material", "metal"), "silver"))
+    if sky is not None:
+        own += [(("surroundings", "panorama"), sky), *GROUND]
+    return load_config(None, [*own, *overrides])
+
+
 def measured(config: SceneConfig, folder: Path) -> Reach:
     """Bake a scene into a folder and look at it."""
     stage = prepare_stage(config)
@@ -178,11 +215,16 @@ def _decibels(squares: float) -> float:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(prog="python -m mirrorbake.study.reach", description=__doc__)
-    parser.add_argument("scenes", nargs="+", metavar="SCENE.toml")
+    parser.add_argument("scenes", nargs="*", metavar="SCENE.toml")
+    parser.add_argument("--mesh", action="append", default=[], metavar="FILE", help="a scene of this object")
+    parser.add_argument("--sky", metavar="FILE", help="a panorama over the objects of --mesh; default: room")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="assignments")
     options = parser.parse_args(arguments)
     overrides = [parse_override(text) for text in options.assignments]
+    if not options.scenes and not options.mesh:
+        parser.error("nothing to look at: expected SCENE.toml or --mesh FILE")
     scenes = {name: load_config(Path(name), overrides) for name in options.scenes}
+    scenes |= {name: scene_of_mesh(name, options.sky, overrides) for name in options.mesh}
     print("| scene | place | PEM | static set | captured at infinity | lead | 16 samples' noise |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for name, config in scenes.items():

@@ -312,6 +312,7 @@ def test_a_box_needs_surroundings_at_a_distance(tmp_path: Path) -> None:
 def test_the_demonstration_is_the_teapot_at_one_degree() -> None:
     config = demo_config()
     assert config.reflector.subdivisions == 25
+    assert config.views.count is not None
     assert config.views.degrees / (config.views.count - 1) == 1.0
 
 

@@ -20,6 +20,7 @@ from mirrorbake.bake.probe import (
 )
 from mirrorbake.bake.quality import QUALITIES, quality_decisions
 from mirrorbake.bake.shell_shapes import planned_shells
+from mirrorbake.bake.spacing import with_spacing
 from mirrorbake.bake.split_shells import shells_decision
 from mirrorbake.bake.trial import lead_advice
 from mirrorbake.bake.worth import advice_of, shared_distant
@@ -83,7 +84,7 @@ def analyze(stage: Stage) -> Plan:
     has_local = {name: _is_local(local, name) for name in stage.built.part_names}
     planned, geometry = planned_shells(stage, probe, has_local, proxy)
     sizes = map_sizes(stage, planned, hull_split=bool(hull_split.value), shared=bool(shared.value))
-    decisions = [
+    first = [
         parts,
         depth,
         samples,
@@ -95,11 +96,15 @@ def analyze(stage: Stage) -> Plan:
         distant,
         shared,
         *sizes,
-        *quality_decisions(stage, cast("int", samples.value)),
     ]
     of_last = (size.value for size in sizes if size.shell in (None, planned[-1].name))
     advice = advice_of(stage, probe, single, max(cast("int", size) for size in of_last))
-    plan = Plan(tuple(decisions), proxy_to_attributes(proxy), planned, tuple(advice))
+
+    def plan_of(spaced: Stage) -> Plan:
+        last = quality_decisions(spaced, cast("int", samples.value))
+        return Plan((*first, *last), proxy_to_attributes(proxy), planned, tuple(advice))
+
+    stage, plan = with_spacing(stage, plan_of)
     lead = lead_advice(stage, plan)
     return plan if lead is None else replace(plan, advice=(lead, *plan.advice))
 

@@ -106,13 +106,11 @@ def bake(
     report = progress or (lambda done, total, text: None)
     source = Source(_core.version(), json.loads(config.model_dump_json()), hash_inputs(config))
     _check_output(location, source)
-    total = len(space_of(config))
-    for index in samples or ():
-        if not 0 <= index < total:
-            raise OptionError(f"sample {index}: expected 0 to {total - 1}")
+    if not config.views.awaits_spacing:
+        _check_samples(samples, len(space_of(config)))
     if config.infer.renderer is not None:
         renderer_named(config.infer.renderer)
-    report(0, total, "preparing the scene")
+    report(0, 1, "preparing the scene")
     stage = replace(stage or prepare_stage(config), config=config)
     with _held(location, shared=samples is not None):
         if PemStore.exists(location):
@@ -121,13 +119,15 @@ def bake(
                 store.location.remove_stray_files()
             contents = store.contents()
         else:
-            report(0, total, "finding out what the scene requires")
+            report(0, 1, "finding out what the scene requires")
             plan = analyze(stage)
             store, contents = None, contents_of(stage.planned(plan), plan, source)
             decided = with_chosen_weight(stage.planned(plan), plan, contents)
             contents = replace(contents, header=replace(contents.header, plan=decided))
         plan = contents.header.plan
         stage = stage.planned(plan)
+        total = len(stage.space)
+        _check_samples(samples, total)
         if on_plan is not None:
             on_plan(plan)
         wanted = list(range(total)) if samples is None else list(dict.fromkeys(samples))
@@ -149,6 +149,12 @@ def bake(
         unconverged = _unconverged(store, missing)
     summary.notes.extend(_words_of(counts))
     return replace(summary, clamped=counts.clamped, unconverged=unconverged)
+
+
+def _check_samples(samples: Sequence[int] | None, total: int) -> None:
+    for index in samples or ():
+        if not 0 <= index < total:
+            raise OptionError(f"sample {index}: expected 0 to {total - 1}")
 
 
 def _words_of(counts: Counts) -> list[str]:

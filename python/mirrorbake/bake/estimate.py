@@ -15,6 +15,7 @@ from mirrorbake.bake.sample import SampleBaker
 
 if TYPE_CHECKING:
     from mirrorbake.pem.store import Contents
+    from mirrorbake.pem.view_images import ViewImages
     from mirrorbake.scene.stage import Stage
 
 
@@ -36,9 +37,16 @@ class Estimate:
         >>> str(Estimate(100, 2.0, 12e6, 2))
         'about 3.3 min and 1.2 GB for 100 samples (2 s and 12 MB each), on 2 threads'
         """
-        time_of_all, disk = _seconds(self.samples * self.seconds), _bytes(self.samples * self.bytes)
+        time_of_all, disk = (
+            time_in_words(self.samples * self.seconds),
+            bytes_in_words(self.samples * self.bytes),
+        )
         samples = f"{self.samples} sample{'s' if self.samples != 1 else ''}"
-        each = f" ({_seconds(self.seconds)} and {_bytes(self.bytes)} each)" if self.samples > 1 else ""
+        each = (
+            f" ({time_in_words(self.seconds)} and {bytes_in_words(self.bytes)} each)"
+            if self.samples > 1
+            else ""
+        )
         threads = f"{self.threads} thread{'s' if self.threads != 1 else ''}"
         return f"about {time_of_all} and {disk} for {samples}{each}, on {threads}"
 
@@ -47,14 +55,16 @@ def _two_digits(value: float) -> str:
     return f"{float(f'{value:.2g}'):g}"
 
 
-def _seconds(seconds: float) -> str:
+def time_in_words(seconds: float) -> str:
+    """Return a time with two digits."""
     for unit, length in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2.0 * length:
             return f"{_two_digits(seconds / length)} {unit}"
     return f"{_two_digits(seconds)} s"
 
 
-def _bytes(count: float) -> str:
+def bytes_in_words(count: float) -> str:
+    """Return a number of bytes with two digits."""
     for unit, length in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
         if count >= length:
             return f"{_two_digits(count / length)} {unit}"
@@ -89,13 +99,18 @@ def estimate(stage: Stage, contents: Contents, samples: int) -> Estimate:
     start = time.perf_counter()
     baked = baker.bake(len(header.space) // 2)
     seconds = (time.perf_counter() - start) * pixels
-    dtype = np.dtype(header.precision)
-
-    def stored(values: np.ndarray) -> int:
-        clipped = np.clip(values, -65504.0, 65504.0).astype(dtype)
-        return len(blosc.compress(np.ascontiguousarray(clipped), b"zstd", 3, 1))
-
-    images = baked.images
-    pictures = stored(np.concatenate([images.object, images.coverage[..., None], images.background], -1))
-    maps = sum(stored(values) for values in baked.maps.values())
+    maps = sum(stored_bytes(values, header.precision) for values in baked.maps.values())
+    pictures = bytes_of_pictures(baked.images, header.precision)
     return Estimate(samples, seconds, maps + pictures * pixels, _core.thread_count())
+
+
+def stored_bytes(values: np.ndarray, precision: str) -> int:
+    """Return what values take on disk."""
+    clipped = np.clip(values, -65504.0, 65504.0).astype(np.dtype(precision))
+    return len(blosc.compress(np.ascontiguousarray(clipped), b"zstd", 3, 1))
+
+
+def bytes_of_pictures(images: ViewImages, precision: str) -> int:
+    """Return what the pictures of a sample take on disk."""
+    layers = [images.object, images.coverage[..., None], images.background]
+    return stored_bytes(np.concatenate(layers, -1), precision)

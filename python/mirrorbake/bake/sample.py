@@ -20,9 +20,10 @@ from mirrorbake.pem.store import SolverReport, Timings
 from mirrorbake.pem.view_images import ViewImages, images_of_trace
 from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.neighbourhood import beside, block, views_around
+from mirrorbake.scene.pose import AT_REST
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -174,19 +175,10 @@ class SampleBaker:
         if header.is_static_set:
             nodes, views = [index], static_views(tracer, stage)
         else:
-            nodes, views = self._with_neighbours(index)
-        prior: list[FloatArray] | None = None
-        if self._infer.prior == "captured":
-            prior = self._fitter.captured_prior(captured)
-            if self._static_maps is not None:
-                prior = [np.ascontiguousarray(texels[:, :3]) for texels in self._static_maps]
+            nodes, views = self.with_neighbours(index)
         middle = time.perf_counter()
-        texels, report = self._fitter.fit(views, pose, prior, len(nodes))
-        mine = texels[nodes.index(index)]
-        maps = {}
-        for name in header.map_names():
-            number = header.map_of(*name)
-            maps[name] = np.ascontiguousarray(mine[number][:, : header.maps[number].channels])
+        texels, report = self._fitter.fit(views, pose, self._prior(captured), len(nodes))
+        maps = self._named(texels[nodes.index(index)])
         seconds = Timings(middle - start, 0.0, time.perf_counter() - middle)
         rejected = sum(one.view.targets.rejected for one in views)
         reports = dict.fromkeys(maps, report)
@@ -201,7 +193,29 @@ class SampleBaker:
             Probing.of(probing),
         )
 
-    def _with_neighbours(self, index: int) -> tuple[list[int], list[FitView]]:
+    def fit(self, nodes: Sequence[int], views: Sequence[FitView]) -> dict[int, Maps]:
+        """Fit the maps of several nodes together, as `with_neighbours` names them and what they see.
+
+        The scene is at rest.
+        """
+        texels, _ = self._fitter.fit(views, AT_REST, self._prior(self._captured), len(nodes))
+        return {node: self._named(mine) for node, mine in zip(nodes, texels, strict=True)}
+
+    def _prior(self, captured: Mapping[str, FloatArray]) -> list[FloatArray] | None:
+        if self._infer.prior != "captured":
+            return None
+        if self._static_maps is not None:
+            return [np.ascontiguousarray(texels[:, :3]) for texels in self._static_maps]
+        return self._fitter.captured_prior(captured)
+
+    def _named(self, texels: Sequence[FloatArray]) -> Maps:
+        header, maps = self._header, {}
+        for name in header.map_names():
+            number = header.map_of(*name)
+            maps[name] = np.ascontiguousarray(texels[number][:, : header.maps[number].channels])
+        return maps
+
+    def with_neighbours(self, index: int) -> tuple[list[int], list[FitView]]:
         """Return the nodes of the fit of a sample, and what it sees."""
         space, infer, trace = self._header.space, self._infer, self._tracer.at
         assert infer.neighbours is not None, "the scene has to be planned first"

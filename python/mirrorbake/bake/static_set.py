@@ -59,6 +59,7 @@ class Dome:
         config, cameras = stage.config, stage.built.cameras
         (low, high), (bottom, top) = cameras.range()
         if config.views.kind == "none":
+            assert config.views.count is not None, "of views without parameters it is a number"
             return Dome(config.views.count, (low, high), (bottom, top))
         assert config.static.views is not None, "the scene has to be planned first"
         around = min(0.5 * (high - low) + config.static.beyond, 180.0)

@@ -22,12 +22,13 @@ from mirrorbake.scene.reflectance import materials_of
 from mirrorbake.tone import srgb_encoded
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
+    from mirrorbake.pem.store import Contents
     from mirrorbake.scene.parameters import Point
-    from mirrorbake.scene.plan import Plan
+    from mirrorbake.scene.plan import DecisionValue, Plan
     from mirrorbake.scene.stage import Stage
 
     Shells = list[list[_core.ShellMap]]
@@ -144,59 +145,34 @@ def run_trial(stage: Stage, plan: Plan) -> Trial | None:
     plan
         Of the bake; the trial has no static set, and its own samples per pixel.
     """
-    small = _small_plan(plan)
-    config = small.resolve(stage.config)
-    infer = with_weight(config.infer, USUAL_WEIGHT) if config.infer.smoothness is None else config.infer
-    infer = infer.model_copy(update={"tolerance": max(infer.tolerance, TOLERANCE)})
-    config = config.model_copy(update={"infer": infer})
-    width, height = stage.built.cameras.size
-    scale = min(1.0, SIDE / max(width, height))
-    size = (max(1, round(scale * width)), max(1, round(scale * height)))
-    cameras = replace(stage.built.cameras, size=size)
-    stage = replace(stage, config=config, built=replace(stage.built, cameras=cameras), moved={}, cut={})
-    contents = contents_of(stage, small, Source("", json.loads(config.model_dump_json()), {}))
+    stage, contents = small_bake(stage, small_plan(plan, {"trace.samples": SAMPLES, "trace.noise": 0.0}))
     header, space = contents.header, stage.space
     index = (len(space) - 1) // 2
     between = space.middle_after(index)
     assert between is not None
     baker = SampleBaker(stage, contents)
     baked = {node: baker.bake(node).maps for node, _ in space.neighbours(between)}
-
-    def pem(weights: Mapping[int, float]) -> Shells:
-        def read(part: str, shell: str) -> FloatArray:
-            return cast(
-                "FloatArray",
-                sum(np.float32(weight) * baked[node][part, shell] for node, weight in weights.items()),
-            )
-
-        return shell_maps(header, read, AT_REST, contents.local_triangles)
-
     at_infinity = _core.ShellMap(
         proxy_from_attributes(header.static["infinite"]),
         topology_of(header.projection, header.map_size),
         pyramid_of(contents.capture, header.projection),
     )
     captured = [[at_infinity] for _ in header.parts]
-    on = _Look(stage, header, space.sample(index))
-    half_way = _Look(stage, header, between)
+    on = Look(stage, header, space.sample(index))
+    half_way = Look(stage, header, between)
     if not on.seen.any() or not half_way.seen.any():
         return None
     return Trial(
-        on.decibels(pem({index: 1.0})),
-        half_way.decibels(pem(dict(space.neighbours(between)))),
+        on.decibels(blended(contents, baked, [(index, 1.0)])),
+        half_way.decibels(blended(contents, baked, space.neighbours(between))),
         half_way.decibels(captured),
-        on.noise(plan.samples, config.trace.most_samples, cast("float", plan.value("trace.noise"))),
+        on.noise(plan.samples, stage.config.trace.most_samples, cast("float", plan.value("trace.noise"))),
     )
 
 
-def _small_plan(plan: Plan) -> Plan:
-    """Return a plan of small maps and steady targets, without static set and diffuse layer."""
-    changed = {
-        "trace.samples": SAMPLES,
-        "trace.noise": 0.0,
-        "static.views": 0,
-        "layers.diffuse": False,
-    }
+def small_plan(plan: Plan, changed: Mapping[str, DecisionValue]) -> Plan:
+    """Return a plan of small maps, without static set and diffuse layer, with other values of some."""
+    changed = {"static.views": 0, "layers.diffuse": False, **changed}
     decisions = []
     for decision in plan.decisions:
         value = changed.get(decision.key, decision.value)
@@ -206,7 +182,36 @@ def _small_plan(plan: Plan) -> Plan:
     return replace(plan, decisions=tuple(decisions))
 
 
-class _Look:
+def small_bake(stage: Stage, plan: Plan) -> tuple[Stage, Contents]:
+    """Return a stage of small pictures by a plan, and what its samples share."""
+    config = plan.resolve(stage.config)
+    infer = with_weight(config.infer, USUAL_WEIGHT) if config.infer.smoothness is None else config.infer
+    infer = infer.model_copy(update={"tolerance": max(infer.tolerance, TOLERANCE)})
+    config = config.model_copy(update={"infer": infer})
+    width, height = stage.built.cameras.size
+    scale = min(1.0, SIDE / max(width, height))
+    size = (max(1, round(scale * width)), max(1, round(scale * height)))
+    cameras = replace(stage.built.cameras, size=size)
+    stage = replace(stage, config=config, built=replace(stage.built, cameras=cameras), moved={}, cut={})
+    return stage, contents_of(stage, plan, Source("", json.loads(config.model_dump_json()), {}))
+
+
+def blended(
+    contents: Contents,
+    maps: Mapping[int, Mapping[tuple[str, str], FloatArray]],
+    weights: Sequence[tuple[int, float]],
+) -> Shells:
+    """Return the blend of samples' maps, to be drawn with the object at rest."""
+
+    def read(part: str, shell: str) -> FloatArray:
+        return cast(
+            "FloatArray", sum(np.float32(weight) * maps[node][part, shell] for node, weight in weights)
+        )
+
+    return shell_maps(contents.header, read, AT_REST, contents.local_triangles)
+
+
+class Look:
     """A view with two halves of a reference, without the body's own light, which all contenders share."""
 
     def __init__(self, stage: Stage, header: Header, point: Point) -> None:
@@ -220,6 +225,7 @@ class _Look:
         for half in range(2):
             options = stage.options
             options.samples_per_pixel, options.seed = REFERENCE_SAMPLES, SEED_OFFSET + half
+            options.noise = 0.0
             traced = stage.tracer.trace_layers(camera, stage.built.reflector, options)
             pixel = np.asarray(traced.samples.pixel)
             light = np.asarray(traced.sample_beauty) - np.asarray(traced.samples.diffuse)

@@ -30,13 +30,15 @@ if TYPE_CHECKING:
     from mirrorbake.bake.estimate import Estimate
 
 
-def _parse_samples(text: str, count: int) -> range:
+def _parse_samples(text: str, count: int | None) -> range:
+    """Return the numbers of samples; without a count, which a plan decides, they have to end somewhere."""
     first, separator, last = text.partition(":")
-    start, end = first or "0", last or str(count)
+    start, end = first or "0", last or ("" if count is None else str(count))
     if not separator or not all(part.isascii() and part.isdigit() for part in (start, end)):
         raise typer.BadParameter(f"--samples {text!r}: expected I:J, such as 0:10 for the first ten")
-    if not int(start) < int(end) <= count:
-        raise typer.BadParameter(f"--samples {text!r}: expected I < J, J at most {count}")
+    if not int(start) < int(end) or (count is not None and int(end) > count):
+        most = "" if count is None else f", J at most {count}"
+        raise typer.BadParameter(f"--samples {text!r}: expected I < J{most}")
     return range(int(start), int(end))
 
 
@@ -90,7 +92,8 @@ def bake_command(
     config = scene_config(
         scene, assignments, views, size, spp, em_size, seed, object_file, sky, draft=draft, quality=quality
     )
-    chosen = None if samples is None else _parse_samples(samples, len(space_of(config)))
+    total = None if config.views.awaits_spacing else len(space_of(config))
+    chosen = None if samples is None else _parse_samples(samples, total)
 
     def announce(found: Estimate) -> bool:
         messages.print(str(found), markup=False, soft_wrap=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -53,6 +53,17 @@ class BuiltScene:
         """(T,) which triangles lie on the reflector's convex hull and cannot reflect it ([PEM] §4)."""
         return hull_triangles(self.positions, self.triangles)
 
+    def with_space(self, space: ParameterSpace) -> BuiltScene:
+        """Return the scene with maps at the nodes of another space, of the same axes.
+
+        Raises
+        ------
+        InputError
+            A view of one of them lies inside the reflector.
+        """
+        _check_eyes(self.scene.object_mesh(self.reflector), self.cameras, space, self.origin)
+        return replace(self, space=space)
+
 
 def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     """Build everything that a scene file describes.
@@ -88,14 +99,7 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
     parts = np.asarray(mesh.parts) if len(mesh.parts) else np.zeros(len(triangles), np.uint16)
     # The cameras stay where they are when the object moves.
     cameras = resolve_cameras(config.views, pose.at_rest(positions.astype(np.float64)), origin)
-    for sample in space.samples():
-        eye = cameras.eye(sample)
-        if _core.encloses(mesh, eye):
-            where = f"t = {format_point(sample)}" if len(sample) == 1 else format_point(sample)
-            raise InputError(
-                f"views: the eye at {where}, {_vector(np.add(eye, origin))}, lies inside the reflector; "
-                "expected a view from outside"
-            )
+    _check_eyes(mesh, cameras, space, origin)
     return BuiltScene(
         origin=origin,
         scene=scene,
@@ -108,6 +112,17 @@ def build_scene(config: SceneConfig, point: Point | None = None) -> BuiltScene:
         space=space,
         notes=notes,
     )
+
+
+def _check_eyes(mesh: _core.TriangleMesh, cameras: Cameras, space: ParameterSpace, origin: Origin) -> None:
+    for sample in space.samples():
+        eye = cameras.eye(sample)
+        if _core.encloses(mesh, eye):
+            where = f"t = {format_point(sample)}" if len(sample) == 1 else format_point(sample)
+            raise InputError(
+                f"views: the eye at {where}, {_vector(np.add(eye, origin))}, lies inside the reflector; "
+                "expected a view from outside"
+            )
 
 
 def _vector(v: NDArray[np.float64]) -> str:

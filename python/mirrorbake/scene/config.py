@@ -286,6 +286,12 @@ class Auto(Section):
     """Relative RMS error of a pixel that the samples of a rough reflector may leave."""
     finer_share: Annotated[float, Field(ge=0, lt=1)] = 0.1
     """Share of the object's pixels whose reflections may be finer than the maps."""
+    decibels: Annotated[float, Field(gt=0, le=100)] = 30.0
+    """PSNR wanted of views between the maps, where `views.count` or `views.rings` is "auto"."""
+    megabytes: Annotated[float, Field(gt=0, le=1e9)] | None = None
+    """That all samples may take on disk then. None: any."""
+    minutes: Annotated[float, Field(gt=0, le=1e7)] | None = None
+    """By the clock of this machine, that baking all samples may take then. None: any."""
 
 
 class SceneConfig(Section):
@@ -336,9 +342,27 @@ class SceneConfig(Section):
                 )
         if self.infer.smoothness is None and self.infer.fit == "layers":
             raise ValueError('infer.smoothness = "auto" needs infer.fit = "display"')
+        self._check_spacing()
         for axis in scene_axes(self).values():
             axis.check(self)
         return self
+
+    def _check_spacing(self) -> None:
+        if self.views.awaits_spacing:
+            key = "views.count" if self.views.count is None else "views.rings"
+            if self.infer.fit == "layers" or self.infer.matrix == "probed":
+                raise ValueError(f'{key} = "auto" needs infer.fit = "display" and infer.matrix = "analytic"')
+            if self.views.count is None and self.views.degrees == 0.0:
+                raise ValueError('views.count = "auto" needs views.degrees other than 0')
+            if self.views.rings is None and self.views.elevation[0] == self.views.elevation[1]:
+                raise ValueError('views.rings = "auto" needs views.elevation with two different angles')
+            return
+        for name in ("decibels", "megabytes", "minutes"):
+            value = getattr(self.auto, name)
+            if value != Auto.model_fields[name].default:
+                raise ValueError(
+                    f'auto.{name} = {value:g}: has no meaning unless views.count or views.rings is "auto"'
+                )
 
 
 PATH_KEYS = (

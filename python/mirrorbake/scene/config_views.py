@@ -52,20 +52,26 @@ class Views(Section):
     """Length of the arc, or of the dome's azimuths, which close at 360. Default of domes: 360."""
     elevation: Annotated[tuple[Elevation, Elevation], BeforeValidator(as_tuple)] = (5.0, 60.0)
     """Of a dome, and of `none`: the lowest and the highest above the horizon."""
-    count: Annotated[int, Field(ge=1, le=100_000)] = 100
-    """Maps along the arc, or along a ring of the dome (default there: 12); of `none`: views (default: 64)."""
+    count: Annotated[Annotated[int, Field(ge=1, le=100_000)] | None, *AUTO] = 100
+    """Maps along the arc, or along a ring of the dome (default there: 12); of `none`: views (default: 64).
+    "auto", of arcs and domes: as few as meet `auto.decibels`."""
     traced: Annotated[Annotated[int, Field(ge=0, le=1000)] | None, *AUTO] = None
     """Views between neighbouring maps that are traced, too, and fitted by what the maps' blend shows. "auto":
-    where the maps are far apart, by `auto.quality`."""
+    where the maps are far apart, by `auto.quality`, or as many as `auto.decibels` needs."""
     around: Annotated[Annotated[int, Field(ge=0, le=1000)] | None, *AUTO] = None
     """Views beside the arc, up to 8 degrees from a sample, to which its maps are fitted, too. "auto": where
     the maps are near, by `auto.quality`."""
-    rings: Annotated[int, Field(ge=1, le=1000)] = 3
-    """Maps of a dome from its lowest to its highest elevation."""
+    rings: Annotated[Annotated[int, Field(ge=1, le=1000)] | None, *AUTO] = 3
+    """Maps of a dome from its lowest to its highest elevation. "auto": as few as meet `auto.decibels`."""
     fov: Annotated[float, Field(gt=0, lt=180)] = 30.0
     """Vertical field of view."""
     size: Annotated[tuple[ImageSide, ImageSide], BeforeValidator(as_tuple)] = (512, 512)
     """Pixels: width, height."""
+
+    @property
+    def awaits_spacing(self) -> bool:
+        """Whether a plan decides how far apart the maps are."""
+        return self.count is None or self.rings is None
 
     @model_validator(mode="before")
     @classmethod
@@ -79,6 +85,8 @@ class Views(Section):
         for key in _MEANINGLESS[self.kind]:
             if getattr(self, key) != type(self).model_fields[key].default:
                 raise ValueError(f"`{key}` has no meaning for kind = {self.kind!r}")
+        if self.kind == "none" and self.count is None:
+            raise ValueError("`count` = 'auto' has no meaning for kind = 'none', which has no maps to space")
         if self.elevation[0] > self.elevation[1]:
             raise ValueError(f"elevation = {list(self.elevation)}: expected the lower one first")
         return self

@@ -314,22 +314,29 @@ def jittered(cell: Sequence[tuple[float, float]], count: int, seed: tuple[int, .
     return [tuple(float(column[i]) for column in columns) for i in range(count)]
 
 
+_ENDS = 2
+"""Nodes of an axis before a plan has decided on them."""
+
+
 def space_of(config: SceneConfig) -> ParameterSpace:
-    """Return the space of a scene file: the camera's axes, then those that change the scene."""
+    """Return the space of a scene file: the camera's axes, then those that change the scene.
+
+    Where a plan is to decide how far apart the maps are, they are at the ends of the axis.
+    """
     changes = [_unit_axis(name, axis.count) for name, axis in scene_axes(config).items()]
     return ParameterSpace((*_camera_axes(config.views), *changes))
 
 
 def _camera_axes(views: Views) -> list[Axis]:
     if views.kind == "arc":
-        return [_unit_axis("arc", views.count)]
+        return [_unit_axis("arc", _ENDS if views.count is None else views.count)]
     if views.kind in ("fixed", "none"):
         return []
     low, high = sorted((views.start, views.start + views.degrees))
     closed = abs(views.degrees) == 360.0
     bottom, top = views.elevation
-    azimuths = _even(low, high, views.count, closed=closed)
-    elevations = _even(bottom, top, views.rings, closed=False)
+    azimuths = _even(low, high, _ENDS if views.count is None else views.count, closed=closed)
+    elevations = _even(bottom, top, _ENDS if views.rings is None else views.rings, closed=False)
     return [
         Axis("azimuth", tuple(azimuths), low, high, 360.0 if closed else None),
         Axis("elevation", tuple(elevations), bottom, top),

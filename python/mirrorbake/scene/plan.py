@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from mirrorbake.scene.config_shells import Shells, ShellSection
+from mirrorbake.scene.spacing_law import SpacingLaw
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,8 +33,9 @@ DECIDED_KEYS = (
     "infer.neighbours",
     "static.views",
 )
-"""Keys of a scene file that may be "auto", in the order in which they are decided. Shells before the last
-have decisions on `shells.proxy`, too."""
+"""Keys of a scene file of which every plan has decisions, in the order in which they are decided. Shells
+before the last have decisions on `shells.proxy`, too; on `infer.smoothness`, `views.count` and `views.rings`
+there are decisions only where these are "auto"."""
 
 
 USUAL_WEIGHT = 1e-4
@@ -117,6 +119,8 @@ class Plan:
     """Front to back."""
     advice: tuple[str, ...] = ()
     """What was measured of choices that are the user's: whether a PEM is worth it, and what would do."""
+    law: SpacingLaw | None = None
+    """Measured where the plan decides how far apart the maps are."""
 
     def value(self, key: str, part: str | None = None, shell: str | None = None) -> DecisionValue:
         """Return what was decided; KeyError for what was not."""
@@ -154,8 +158,9 @@ class Plan:
         return bool(self.value("layers.local", part))
 
     def lines(self) -> list[str]:
-        """Return the decisions in words, one a line, and the advice as comments."""
-        return [*(str(decision) for decision in self.decisions), *(f"# {words}" for words in self.advice)]
+        """Return the decisions in words, one a line, and the law of spacing and the advice as comments."""
+        comments = [*([] if self.law is None else [str(self.law)]), *self.advice]
+        return [*(str(decision) for decision in self.decisions), *(f"# {words}" for words in comments)]
 
     @property
     def has_hull_split(self) -> bool:
@@ -179,12 +184,16 @@ class Plan:
         weight = next((d.value for d in self.decisions if d.key == "infer.smoothness"), None)
         if infer.smoothness is None and weight is not None:
             infer = with_weight(infer, cast("float", weight))
+        views = resolved("views", "traced", "around")
+        spaced = {d.key: d.value for d in self.decisions if d.key in ("views.count", "views.rings")}
+        if spaced:
+            views = views.model_copy(update={key.split(".")[1]: value for key, value in spaced.items()})
         return config.model_copy(
             update={
                 "reflector": resolved("reflector", "parts"),
                 "maps": resolved("maps", "shared_distant"),
                 "trace": resolved("trace", "samples", "noise", "depth"),
-                "views": resolved("views", "traced", "around"),
+                "views": views,
                 "infer": infer,
                 "static": resolved("static", "views"),
                 "shells": self.shell_sections,
@@ -198,6 +207,7 @@ class Plan:
             "distant": self.distant,
             "shells": [asdict(shell) for shell in self.shells],
             "advice": list(self.advice),
+            **({} if self.law is None else {"law": self.law.to_dict()}),
         }
 
     @staticmethod
@@ -208,6 +218,7 @@ class Plan:
             data["distant"],
             tuple(PlannedShell(**shell) for shell in data["shells"]),
             tuple(data["advice"]),
+            SpacingLaw.from_dict(data["law"]) if "law" in data else None,
         )
         for key in DECIDED_KEYS:
             if all(decision.key != key for decision in plan.decisions):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from mirrorbake import _core
 from mirrorbake.scene.build import BuiltScene, build_scene
 from mirrorbake.scene.config_shells import DEFAULT_SHELLS
+from mirrorbake.scene.parameters import space_of
 from mirrorbake.scene.shell_rules import trace_rules
 
 if TYPE_CHECKING:
@@ -64,7 +65,19 @@ class Stage:
         """Return the stage with what a plan decides in place of "auto", so that its views can be traced."""
         config = plan.resolve(self.config)
         assert config.reflector.parts is not None, "a plan decides the parts"
-        return replace(self.in_parts(config.reflector.parts), config=config)
+        stage = replace(self.in_parts(config.reflector.parts), config=config)
+        return stage.spaced(config) if self.config.views.awaits_spacing else stage
+
+    def spaced(self, config: SceneConfig) -> Stage:
+        """Return the stage with the nodes of a scene that is this one but for how far apart its maps are.
+
+        Raises
+        ------
+        InputError
+            One of its views lies inside the reflector.
+        """
+        built = self.built.with_space(space_of(config))
+        return replace(self, config=config, built=built, moved={}, cut={})
 
     def in_parts(self, parts: Parts) -> Stage:
         """Return the stage with its reflector in other parts (`reflector.parts`)."""

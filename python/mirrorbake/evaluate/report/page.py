@@ -328,7 +328,33 @@ def _plan(store: PemStore) -> str:
         rows.append([_cell(decision.key), _cell(value), _cell(reason, "words")])
     advice = [f'<p class="soft">{html.escape(_sentence(words))}</p>' for words in store.header.plan.advice]
     table = _rows(["key", "value", "reason"], rows)
-    return "\n".join(["<h2>What was decided, and why</h2>", *advice, table])
+    return "\n".join(["<h2>What was decided, and why</h2>", *advice, table, law_section(store)])
+
+
+def law_section(store: PemStore) -> str:
+    """Return what was measured to decide how far apart the maps are, as HTML; nothing where it was not."""
+    law = store.header.plan.law
+    if law is None:
+        return ""
+    trials = sorted(law.trials, key=lambda trial: (trial.degrees, trial.traced))
+    degrees, decibels = [trial.degrees for trial in trials], [trial.decibels for trial in trials]
+    plot = Plot(
+        degrees, decibels, ("degrees between maps", "dB"), title="PSNR between maps, by their spacing"
+    )
+    fractions = [number / 60.0 for number in range(61)]
+    along = [degrees[0] * (degrees[-1] / degrees[0]) ** fraction for fraction in fractions]
+    plot.curve([(at, law.decibels(at)) for at in along], 'style="stroke:var(--ink)" stroke-width="2"')
+    for trial in trials:
+        words = f"{trial.degrees:.3g} degrees, {trial.traced} traced views in a cell: {trial.decibels:.1f} dB"
+        plot.point(trial.degrees, trial.decibels, 'style="fill:var(--ink)"', words)
+    rows = [
+        [_cell(f"{trial.degrees:.3g}°"), _cell(str(trial.traced)), _cell(f"{trial.decibels:.1f} dB")]
+        for trial in trials
+    ]
+    table = _rows(["between maps", "traced views in a cell", "views that were in no fit"], rows)
+    chart = f'<div class="scroll">{plot.svg()}</div>' if degrees[-1] > degrees[0] else ""
+    words = html.escape(_sentence(str(law)))
+    return f'<h3>The law of spacing</h3>\n<p class="soft">{words}</p>\n{chart}\n{table}'
 
 
 def _sentence(words: str) -> str:

@@ -110,10 +110,10 @@ def _samples(own: int) -> list[int]:
 
 
 def _spacing(config: SceneConfig) -> Axis | None:
-    views = config.views
-    step = views.degrees / max(views.count - 1, 1)
-    if views.count < 2 or step == 0.0:
+    views, count = config.views, config.views.count
+    if count is None or count < 2 or views.degrees == 0.0:
         return None
+    step = views.degrees / (count - 1)
     middle = views.start + 0.5 * views.degrees
     settings = [Setting(f"{abs(step):g}°")]
     for factor in (0.5, 2.0, 5.0):
@@ -125,7 +125,7 @@ def _spacing(config: SceneConfig) -> Axis | None:
 
 
 def _blending(config: SceneConfig) -> Axis | None:
-    if config.views.count < 2:
+    if config.views.count is None or config.views.count < 2:
         return None
     settings = (Setting("blended"), Setting("nearest", drawing=Drawing(nearest=True)))
     return Axis("blending", "between samples", settings)

@@ -246,6 +246,8 @@ def _studied(config: SceneConfig) -> Stage:
     views = config.views
     if views.kind != "arc":
         raise InputError(f"views.kind = {views.kind!r}: a study needs views on an arc")
+    if views.count is None:
+        raise InputError('views.count = "auto": a study needs a number')
     if views.count > 1:
         step = views.degrees / (views.count - 1)
         middle = views.start + step * ((views.count - 1) // 2)

@@ -309,4 +309,5 @@ def _middle(count: int) -> int:
 def nodes_looked_at(config: SceneConfig) -> list[int]:
     """Numbers of the samples from whose maps `PLACES` are drawn: the middle one, and those up to the last."""
     count = config.views.count
+    assert count is not None, "a study has a number of views"
     return list(range(_middle(count), count))

@@ -60,12 +60,12 @@ class Stability:
             f"{self.largest:.2f} at most"
         ]
         for cost, front in self.fronts.items():
-            below = "nothing as cheap as"
+            below = "has nothing as cheap"
             if math.isfinite(front.off):
-                below = f"at most {front.off:.2f} dB below"
+                below = f"is at most {front.off:.2f} dB below this one's best at any price"
             found.append(
                 f"{NOUNS[cost]}: {front.kept} of {front.steps} steps of the other's front are on this one; "
-                f"it has {below} this one's best at any price; costs differ by {front.ratio:.0%}"
+                f"it {below}; costs differ by {front.ratio:.0%}"
             )
         return found
 

@@ -8,9 +8,9 @@ bandwidth of the memory.
 SciPy's LSMR and LSQR, Eigen's LeastSquaresConjugateGradient, and conjugate gradients with an incomplete
 Cholesky factor on the normal equations take one right-hand side at a time. All are given columns scaled to
 unit length, our own preconditioner. Solves and steps are of one thread and in its processor time, which other
-programs disturb less than a clock, and a BLAS that waits in threads of its own not at all; SciPy's are shown
-once more beside ours on all cores, both by the clock, since SciPy's solvers use one. The error is the norm of
-the residual over that of b; of `A x`, the largest against float64.
+programs disturb less than a clock; script/bench keeps SciPy's BLAS to that thread, since waiting for others
+takes it as long again. SciPy's are shown once more beside ours on all cores, both by the clock. The error is
+the norm of the residual over that of b; of `A x`, the largest against float64.
 """
 
 import argparse
@@ -206,10 +206,10 @@ def step(
     solvers = [solver_of(matrix, problem, 1e-30, steps) for steps in (few, many)]
     times = [min(timed(partial(solve, solver)) for _ in range(4)) for solver in solvers]
     seen = len(np.unique(matrix.texels))
-    # An entry's number in its band of rows, 2 bytes, and its weight, 4; a row's offset and weights; of an
+    # An entry's number in its band of rows, 2 bytes, and its weight, 4; a row's count and weights; of an
     # unknown vectors of 16 bytes, as often as a step reads or writes one at the least, and where its further
     # shares begin. What several bands read is read and given back by each of them; that is not counted.
-    moved = 6 * matrix.nonzeros + (8 + 16) * matrix.rows + (15 * 16 + 4) * seen
+    moved = 6 * matrix.nonzeros + (4 + 16) * matrix.rows + (12 * 16 + 4) * seen
     return Case(
         case=f"a step, {problem.name}, {moved / 1e6:.0f} MB",
         unit="ms",

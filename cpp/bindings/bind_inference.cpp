@@ -267,7 +267,7 @@ several views ([PEM] section 4): what all solves share is computed once.)")
             new (self) MapSolver(solver_views, maps, nodes, options);
           },
           nb::arg("views"), nb::arg("maps"), nb::arg("nodes") = 1, nb::arg("options") = SolveOptions{},
-          nb::keep_alive<1, 2>(), signature<R"(def __init__(self,
+          signature<R"(def __init__(self,
 views: collections.abc.Sequence[tuple[RenderingMatrix, collections.abc.Sequence[tuple[int, float]]]],
 maps: collections.abc.Sequence[TexelTopology | CubePyramidLayout], nodes: int = 1,
 options: SolveOptions = ...) -> None)">(),

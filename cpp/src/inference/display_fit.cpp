@@ -225,6 +225,8 @@ DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPa
   }
   for (std::size_t v = 0; v < views.size(); ++v) solver_views.push_back({&joint[v].matrix, views[v].nodes});
   const MapSolver solver(solver_views, maps, nodes, options.solve);
+  // It has taken what it needs of them.
+  for (JointRows& rows : joint) rows.matrix = {};
 
   fit.layers = start.report;
   for (int pass = 0; pass < options.passes; ++pass) {

@@ -38,8 +38,8 @@ Channels to_channels(const ChannelSums& sums) {
 void clamp_to(const Bounds& bounds, Vector& x) {
   parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      for (std::size_t k = 0; k < 4; ++k)
-        x[i][k] = std::clamp(x[i][k], bounds.lower[i][k], bounds.upper[i][k]);
+      const Channels lower = bounds.lower(i), upper = bounds.upper(i);
+      for (std::size_t k = 0; k < 4; ++k) x[i][k] = std::clamp(x[i][k], lower[k], upper[k]);
     }
   });
 }
@@ -54,11 +54,11 @@ bool keeps(const Bounds& bounds, const Vector& x, const Vector& s, const Vector&
   std::atomic<bool> kept{true};
   parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end && kept.load(std::memory_order_relaxed); ++i) {
+      const Channels lower = bounds.lower(i), upper = bounds.upper(i);
       for (std::size_t k = 0; k < 4; ++k) {
-        const float lower = bounds.lower[i][k], upper = bounds.upper[i][k];
-        const bool left = x[i][k] < lower || x[i][k] > upper;
+        const bool left = x[i][k] < lower[k] || x[i][k] > upper[k];
         const bool returns =
-            inverse[i][k] == 0.0F && s[i][k] != 0.0F && !held(x[i][k], s[i][k], lower, upper);
+            inverse[i][k] == 0.0F && s[i][k] != 0.0F && !held(x[i][k], s[i][k], lower[k], upper[k]);
         if (left || returns) kept = false;
       }
     }
@@ -121,7 +121,7 @@ ChannelSums LeastSquares::find_row_scale() {
 // undetermined, large positive and negative ones cancel.
 SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const Bounds& bounds, Vector& x) {
   const std::size_t n = state_.unknowns();
-  Iterate it{Vector(n), Vector(n), Vector(n), Vector(n)};
+  Iterate it{Vector(n), Vector(n), Vector(n), {}};
   evaluate(target, magnitude, it.step, it);
   begin_round(magnitude, nullptr, it.step, it);
   const ChannelSums start = it.gamma;
@@ -189,7 +189,7 @@ ChannelSums LeastSquares::evaluate(const Vector& target, float magnitude, const 
     }
     return to_sums(sums);
   });
-  for (std::size_t k = 0; k < 4; ++k) squares[k] += regular[k];
+  add(squares, regular);
   return squares;
 }
 
@@ -198,8 +198,11 @@ void LeastSquares::begin_round(float magnitude, const Bounds* bounds, const Vect
     ChannelDoubles sums{};
     for (std::size_t i = begin; i < end; ++i) {
       Channels inverse = preconditioner(i, magnitude);
-      for (std::size_t k = 0; bounds != nullptr && k < 4; ++k) {
-        if (held(x[i][k], it.s[i][k], bounds->lower[i][k], bounds->upper[i][k])) inverse[k] = 0.0F;
+      if (bounds != nullptr) {
+        const Channels lower = bounds->lower(i), upper = bounds->upper(i);
+        for (std::size_t k = 0; k < 4; ++k) {
+          if (held(x[i][k], it.s[i][k], lower[k], upper[k])) inverse[k] = 0.0F;
+        }
       }
       it.inverse[i] = inverse;
       it.step[i] = inverse * it.s[i];
@@ -209,27 +212,35 @@ void LeastSquares::begin_round(float magnitude, const Bounds* bounds, const Vect
   });
 }
 
-// One step of conjugate gradients.
+// One step of conjugate gradients. With three passes over the unknowns, none of which keeps the matrix's
+// product with the step: what length the step has is known from the rows before their shares are added up.
 void LeastSquares::step_once(float magnitude, Vector& x, Iterate& it) {
   const std::size_t n = x.size();
-  state_.rows.normal(weights_, it.step, shares_);
-  state_.regulariser.prepare(it.step, scratch_);
-  const ChannelSums curvature = parallel_channel_sums(n, [&](std::size_t begin, std::size_t end) {
-    ChannelDoubles sums{};
-    for (std::size_t j = begin; j < end; ++j) {
-      it.normal[j] = state_.rows.sum(shares_, j) + regularised(j, magnitude, it.step);
-      add_product(sums, it.step[j], it.normal[j]);
-    }
-    return to_sums(sums);
-  });
+  const bool regular = magnitude > 0.0F || state_.regulariser.acts();
+  ChannelSums curvature = state_.rows.normal(weights_, it.step, shares_);
+  if (regular) {
+    it.regular.resize(n);
+    state_.regulariser.prepare(it.step, scratch_);
+    add(curvature, parallel_channel_sums(n, [&](std::size_t begin, std::size_t end) {
+          ChannelDoubles sums{};
+          for (std::size_t j = begin; j < end; ++j) {
+            it.regular[j] = regularised(j, magnitude, it.step);
+            add_product(sums, it.step[j], it.regular[j]);
+          }
+          return to_sums(sums);
+        }));
+  }
   ChannelSums length{};
   for (std::size_t k = 0; k < 4; ++k) length[k] = curvature[k] > 0 ? it.gamma[k] / curvature[k] : 0;
   const Channels a = to_channels(length);
   const ChannelSums next = parallel_channel_sums(n, [&](std::size_t begin, std::size_t end) {
     ChannelDoubles sums{};
     for (std::size_t j = begin; j < end; ++j) {
-      it.s[j] -= a * it.normal[j];
-      add_product(sums, it.s[j], it.inverse[j] * it.s[j]);
+      Channels normal = state_.rows.sum(shares_, j);
+      if (regular) normal += it.regular[j];
+      const Channels s = it.s[j] - a * normal;
+      it.s[j] = s;
+      add_product(sums, s, it.inverse[j] * s);
     }
     return to_sums(sums);
   });
@@ -239,8 +250,9 @@ void LeastSquares::step_once(float magnitude, Vector& x, Iterate& it) {
   const Channels b = to_channels(ratio);
   parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t j = begin; j < end; ++j) {
-      x[j] += a * it.step[j];
-      it.step[j] = it.inverse[j] * it.s[j] + b * it.step[j];
+      const Channels step = it.step[j];
+      x[j] += a * step;
+      it.step[j] = it.inverse[j] * it.s[j] + b * step;
     }
   });
 }

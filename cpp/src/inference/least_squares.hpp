@@ -24,9 +24,13 @@ struct MapSolver::State {
   std::size_t unknowns() const { return texels.size(); }
 };
 
-/// Of every unknown; the unknowns may be differences from a prior.
+/// Of what unknowns are differences from: 0 and `largest`.
 struct Bounds {
-  Vector lower, upper;
+  std::span<const Channels> base;  // of every unknown
+  Channels largest;
+
+  Channels lower(std::size_t i) const { return -base[i]; }
+  Channels upper(std::size_t i) const { return largest - base[i]; }
 };
 
 /// One solve: the operator with the rows' weights, and what it needs to work in.
@@ -47,9 +51,9 @@ class LeastSquares {
 
  private:
   /// What conjugate gradients carry along. s: half the negative gradient; inverse: of the diagonal, 0 for
-  /// what is held on a bound; normal: the system's matrix times the step.
+  /// what is held on a bound; regular: the regulariser times the step, empty without one.
   struct Iterate {
-    Vector s, step, normal, inverse;
+    Vector s, step, inverse, regular;
     ChannelSums gamma{};
   };
 

@@ -56,7 +56,7 @@ MapSolver::MapSolver(std::span<const SolverView> views, std::span<const TexelTop
       check_at_least("node weight", static_cast<double>(node.weight), 0.0);
     }
   }
-  BandedRows rows(views, texels);
+  BandedRows rows(views, maps);
   std::vector<std::uint32_t> numbered = rows.number(nodes);
   std::vector<std::uint8_t> seen(all);
   std::vector<std::uint32_t> number_of(all, kNoTexel);
@@ -86,7 +86,7 @@ void check(const SolveProblem& problem, const MapSolver::State& state) {
   const std::size_t c = static_cast<std::size_t>(problem.channels);
   check_length("views", problem.views.size(), state.rows.views(), "those of the solver");
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    const std::size_t expected = (state.rows.first_row(v + 1) - state.rows.first_row(v)) * c;
+    const std::size_t expected = state.rows.places(v).size() * c;
     check_length("target", problem.views[v].target.size(), expected, "rows × channels");
     check_length("row_weights", problem.views[v].row_weights.size(), expected, "rows × channels");
     check_magnitude("target", problem.views[v].target);
@@ -105,13 +105,16 @@ void check(const SolveProblem& problem, const MapSolver::State& state) {
   }
 }
 
-// Of all views, one behind the other.
-Vector widen_rows(const SolveProblem& problem, std::span<const float> ViewTarget::*values, std::size_t rows) {
-  Vector wide;
-  wide.reserve(rows);
-  for (const ViewTarget& view : problem.views) {
-    const Vector of_view = widen(view.*values, problem.channels);
-    wide.insert(wide.end(), of_view.begin(), of_view.end());
+// Of the rows in the order of their bands.
+Vector widen_rows(const SolveProblem& problem, std::span<const float> ViewTarget::*values,
+                  const BandedRows& rows) {
+  const auto channels = static_cast<std::size_t>(problem.channels);
+  Vector wide(rows.rows());
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+    const float* value = (problem.views[v].*values).data();
+    for (const std::uint32_t r : rows.places(v)) {
+      for (std::size_t k = 0; k < channels; ++k) wide[r][k] = *value++;
+    }
   }
   return wide;
 }
@@ -132,8 +135,8 @@ MapSolution MapSolver::solve(const SolveProblem& problem) const {
   check(problem, s);
   const std::size_t c = static_cast<std::size_t>(problem.channels);
   const std::size_t n = s.unknowns();
-  Vector wanted = widen_rows(problem, &ViewTarget::target, s.rows.rows());
-  const Vector row_weights = widen_rows(problem, &ViewTarget::row_weights, s.rows.rows());
+  Vector wanted = widen_rows(problem, &ViewTarget::target, s.rows);
+  const Vector row_weights = widen_rows(problem, &ViewTarget::row_weights, s.rows);
   LeastSquares system(s, row_weights);
 
   // Of a map of all nodes, the texels that are seen.
@@ -157,11 +160,7 @@ MapSolution MapSolver::solve(const SolveProblem& problem) const {
 
   Channels largest{};
   for (std::size_t k = 0; k < 4; ++k) largest[k] = problem.upper_bounds[k];
-  Bounds bounds{Vector(n), Vector(n)};
-  for (std::size_t i = 0; i < n; ++i) {
-    bounds.lower[i] = -base[i];
-    bounds.upper[i] = largest - base[i];
-  }
+  const Bounds bounds{base, largest};
 
   Vector x;
   if (problem.initial.empty()) {

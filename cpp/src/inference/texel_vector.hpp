@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include "mirrorbake/core/parallel.hpp"
@@ -24,6 +23,10 @@ inline constexpr std::size_t kVectorGrain = 8192;
 
 inline Channels broadcast(float value) { return Channels{value, value, value, value}; }
 
+inline void add(ChannelSums& sums, const ChannelSums& more) {
+  for (std::size_t k = 0; k < 4; ++k) sums[k] += more[k];
+}
+
 /// Sum of `body(begin, end)` over chunks, per channel, added up in the order of the chunks.
 template <typename Body>
 ChannelSums parallel_channel_sums(std::size_t count, const Body& body) {
@@ -31,9 +34,7 @@ ChannelSums parallel_channel_sums(std::size_t count, const Body& body) {
   parallel_for(count, kVectorGrain,
                [&](std::size_t begin, std::size_t end) { partial[begin / kVectorGrain] = body(begin, end); });
   ChannelSums sums{};
-  for (const ChannelSums& part : partial) {
-    for (std::size_t k = 0; k < 4; ++k) sums[k] += part[k];
-  }
+  for (const ChannelSums& part : partial) add(sums, part);
   return sums;
 }
 
@@ -46,17 +47,6 @@ inline void add_product(ChannelDoubles& sums, Channels a, Channels b) {
 
 inline ChannelSums to_sums(const ChannelDoubles& sums) {
   return {sums.low[0], sums.low[1], sums.high[0], sums.high[1]};
-}
-
-inline std::vector<Channels> widen(std::span<const float> values, int channels) {
-  const std::size_t c = static_cast<std::size_t>(channels);
-  std::vector<Channels> wide(values.size() / c);
-  for (std::size_t i = 0; i < wide.size(); ++i) {
-    Channels v{};
-    for (std::size_t k = 0; k < c; ++k) v[k] = values[i * c + k];
-    wide[i] = v;
-  }
-  return wide;
 }
 
 }  // namespace mirrorbake

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -402,6 +403,56 @@ TEST(MapSolver, NodesAreFoundFromViewsOfTheirBlends) {
 }
 
 // A row that reads more texels than 16 bits count, between rows that read few.
+// Which view a row belongs to says nothing of the map where views see the same nodes, even with another
+// view between them. Up to rounding: sums are made in another order.
+TEST(MapSolver, RowsMayBeDividedAmongViews) {
+  const Problem problem = make_problem(48, 4, 16);
+  const RenderingMatrix& whole = problem.matrix;
+  const std::vector<float> map = testing::random_values(whole.columns, 11);
+  const std::vector<float> target = multiply(whole, map, 1);
+  std::array<RenderingMatrix, 3> matrices;
+  std::array<std::vector<float>, 3> targets, weights;
+  for (RenderingMatrix& matrix : matrices) {
+    matrix.columns = whole.columns;
+    matrix.row_offsets = {0};
+  }
+  const auto give = [&](std::size_t view, std::size_t r, float wanted) {
+    for (std::size_t e = whole.row_offsets[r]; e < whole.row_offsets[r + 1]; ++e) {
+      matrices[view].texels.push_back(whole.texels[e]);
+      matrices[view].weights.push_back(whole.weights[e]);
+    }
+    matrices[view].row_offsets.push_back(matrices[view].texels.size());
+    matrices[view].row_pixels.push_back(whole.row_pixels[r]);
+    targets[view].push_back(wanted);
+    weights[view].push_back(problem.row_weights[r]);
+  };
+  for (std::size_t r = 0; r < whole.rows(); ++r) {
+    give(r % 3 == 0 ? 0 : 2, r, target[r]);
+    give(1, r, 1.0F);
+  }
+  const TexelTopology topology = problem.layout;
+  const SolveOptions options{.tolerance = 1e-5F, .max_iterations = 5000};
+  const std::array<SolverView, 2> undivided{SolverView{&whole, {{0}}}, {&matrices[1], {{1}}}};
+  const std::array<ViewTarget, 2> undivided_targets{ViewTarget{target, problem.row_weights},
+                                                    {targets[1], weights[1]}};
+  const std::array<SolverView, 3> divided{
+      SolverView{&matrices[0], {{0}}}, {&matrices[1], {{1}}}, {&matrices[2], {{0}}}};
+  const std::array<ViewTarget, 3> divided_targets{
+      ViewTarget{targets[0], weights[0]}, {targets[1], weights[1]}, {targets[2], weights[2]}};
+  const MapSolution expected =
+      MapSolver(undivided, {&topology, 1}, 2, options).solve({.channels = 1, .views = undivided_targets});
+  const MapSolution found =
+      MapSolver(divided, {&topology, 1}, 2, options).solve({.channels = 1, .views = divided_targets});
+  ASSERT_TRUE(expected.report.converged && found.report.converged);
+  ASSERT_EQ(found.texels.size(), expected.texels.size());
+  double difference = 0, norm = 0;
+  for (std::size_t i = 0; i < found.texels.size(); ++i) {
+    difference += std::pow(static_cast<double>(found.texels[i] - expected.texels[i]), 2);
+    norm += std::pow(static_cast<double>(expected.texels[i]), 2);
+  }
+  EXPECT_LT(std::sqrt(difference / norm), 1e-3);
+}
+
 TEST(MapSolver, SolvesRowsOfAHundredThousandTexels) {
   const CubePyramidLayout layout = CubePyramidLayout::full(256);
   RenderingMatrix matrix;

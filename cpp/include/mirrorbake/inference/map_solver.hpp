@@ -58,11 +58,13 @@ struct SolveReport {
 struct NodeWeight {
   int node = 0;
   float weight = 1.0F;
+
+  bool operator==(const NodeWeight&) const = default;
 };
 
 /// A view of maps that are blended from those of several nodes: it sees b = A Σₖ weightₖ xₖ. One node of
 /// weight 1 is the ordinary case; several views of one node are solved jointly for one map (spec I4).
-/// `matrix` has to outlive the solver.
+/// A solver needs `matrix` only while it is constructed.
 struct SolverView {
   const RenderingMatrix* matrix = nullptr;
   std::vector<NodeWeight> nodes = {{}};

@@ -205,18 +205,21 @@ void bind_tracer_options(nb::module_& m) {
       .def(
           "__init__",
           [](TracerOptions* self, IndirectLight indirect, int cache_rays, int cache_bounces,
-             std::uint64_t seed) {
-            new (self) TracerOptions{indirect, cache_rays, cache_bounces, seed};
+             std::uint64_t seed, int focus) {
+            new (self) TracerOptions{indirect, cache_rays, cache_bounces, seed, focus};
           },
           nb::kw_only(), nb::arg("indirect") = TracerOptions{}.indirect,
           nb::arg("cache_rays") = TracerOptions{}.cache_rays,
-          nb::arg("cache_bounces") = TracerOptions{}.cache_bounces, nb::arg("seed") = TracerOptions{}.seed)
+          nb::arg("cache_bounces") = TracerOptions{}.cache_bounces, nb::arg("seed") = TracerOptions{}.seed,
+          nb::arg("focus") = TracerOptions{}.focus)
       .def_rw("indirect", &TracerOptions::indirect)
       .def_rw("cache_rays", &TracerOptions::cache_rays,
               "Gather rays per vertex, 1 to 65536; a quarter after the first bounce.")
       .def_rw("cache_bounces", &TracerOptions::cache_bounces, "Diffuse bounces of the cache, 1 to 16.")
-      .def_rw("seed", &TracerOptions::seed, "Of the cache.");
-  record(tracer_options, {"indirect", "cache_rays", "cache_bounces", "seed"});
+      .def_rw("seed", &TracerOptions::seed, "Of the cache.")
+      .def_rw("focus", &TracerOptions::focus,
+              "Object number. It mirrors what is close to it, so the cache is finer there; below 0: none.");
+  record(tracer_options, {"indirect", "cache_rays", "cache_bounces", "seed", "focus"});
 }
 
 void bind_shell_rule(nb::module_& m) {

@@ -40,7 +40,7 @@ class Layers final : public Command {
     Source source = request_.load();
     const Camera camera = request_.camera(source);
     std::vector<int> numbers = objects(source.scene);
-    const Tracer tracer = request_.tracer(std::move(source));
+    const Tracer tracer = request_.tracer(std::move(source), numbers.size() == 1 ? numbers.front() : -1);
     std::vector<LayerTrace> traces = tracer.trace_layers(camera, numbers, options);
     if (reflectors_.empty()) drop_unseen(traces, numbers);
 

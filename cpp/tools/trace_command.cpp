@@ -229,10 +229,11 @@ TraceOptions Request::trace_options() const {
   return options;
 }
 
-Tracer Request::tracer(Source source) const {
+Tracer Request::tracer(Source source, int focus) const {
   TracerOptions options;
   options.indirect = parse_name<IndirectLight>(indirect);
   options.seed = seed;
+  options.focus = focus;
   return Tracer(std::move(source.scene), options);
 }
 

@@ -51,7 +51,7 @@ struct Request {
 
   Camera camera(const Source& source) const;
   TraceOptions trace_options() const;
-  Tracer tracer(Source source) const;
+  Tracer tracer(Source source, int focus = -1) const;
 
   void save(const Image& image) const { warn(save_image(output, image, parse_name<PixelFormat>(format))); }
   void warn(const SaveReport& report) const { warn_of_losses("mb-trace", output, report); }

@@ -1114,7 +1114,7 @@ class Camera:
 class TracerOptions:
     """What is decided once per scene."""
 
-    def __init__(self, *, indirect: Literal['none', 'cached', 'path'] = 'cached', cache_rays: int = 64, cache_bounces: int = 6, seed: int = 0) -> None: ...
+    def __init__(self, *, indirect: Literal['none', 'cached', 'path'] = 'cached', cache_rays: int = 64, cache_bounces: int = 6, seed: int = 0, focus: int = -1) -> None: ...
 
     @property
     def indirect(self) -> Literal['none', 'cached', 'path']: ...
@@ -1142,6 +1142,15 @@ class TracerOptions:
 
     @seed.setter
     def seed(self, arg: int, /) -> None: ...
+
+    @property
+    def focus(self) -> int:
+        """
+        Object number. It mirrors what is close to it, so the cache is finer there; below 0: none.
+        """
+
+    @focus.setter
+    def focus(self, arg: int, /) -> None: ...
 
     def __repr__(self) -> str: ...
 

@@ -24,17 +24,23 @@ inline glm::vec3 face_normal(const World& world, std::uint32_t object, std::uint
   return triangle_normal(p[t.x], p[t.y], p[t.z]);
 }
 
-/// A random point of the triangle near one of its corners, seen from the side of `towards`. At the corner
-/// itself a ray would start in the edge between two walls, inside both.
-inline Surface surface_near_corner(const World& world, const TriangleCorner& corner, glm::vec2 u,
-                                   glm::vec3 towards) {
+/// Weights of a triangle's corners at a random point near one of them. At the corner itself a ray would start
+/// in the edge between two walls, inside both. `u` in [0,1)².
+inline glm::vec3 weights_near_corner(std::uint32_t corner, glm::vec2 u) {
   constexpr float kSpread = 0.25F;  // of the way across the triangle
-  const glm::vec2 weights = kSpread * u.x * glm::vec2(1.0F - u.y, u.y);
-  float barycentric[3];
-  barycentric[corner.corner] = 1.0F - weights.x - weights.y;
-  barycentric[(corner.corner + 1) % 3] = weights.x;
-  barycentric[(corner.corner + 2) % 3] = weights.y;
-  const Hit hit{0.0F, corner.object, corner.triangle, barycentric[1], barycentric[2]};
+  const glm::vec2 others = kSpread * u.x * glm::vec2(1.0F - u.y, u.y);
+  const auto c = static_cast<int>(corner);
+  glm::vec3 weights(0.0F);
+  weights[c] = 1.0F - others.x - others.y;
+  weights[(c + 1) % 3] = others.x;
+  weights[(c + 2) % 3] = others.y;
+  return weights;
+}
+
+/// A point of a triangle, seen from the side of `towards`. `weights` are those of the second and third corner.
+inline Surface surface_of_triangle(const World& world, std::uint32_t object, std::uint32_t triangle,
+                                   glm::vec2 weights, glm::vec3 towards) {
+  const Hit hit{0.0F, object, triangle, weights.x, weights.y};
   return surface_at(world.scene, world.rays, hit, -towards);
 }
 

@@ -22,12 +22,12 @@ constexpr int kProbeRays = 16;
 constexpr int kLaterShare = 4;
 // Caustics are as sharp as the mirrors: as many times the rays of the first pass, where there are any.
 constexpr int kCausticShare = 4;
-// Corners of a flat-shaded mesh share a slot if their faces differ by less than acos(0.999) = 2.6°.
-constexpr float kSameFace = 0.999F;
-// Slots of an object up to which each takes all of its rays; beyond it the object's rays are as many as these
-// have, down to a share that the mean with a vertex and its ring of six makes up for.
-constexpr float kSlotsWithAllRays = 16384.0F;
+// Nodes of an object up to which each takes all of its rays; beyond it the object's rays are as many as these
+// have, down to a share that the mean with a node and its ring of six makes up for.
+constexpr float kNodesWithAllRays = 16384.0F;
 constexpr float kLeastShare = 0.2F;
+// Nodes that cuts have made lie close together, where pictures show several in the place of one.
+constexpr float kShareOfCuts = 0.5F;
 constexpr int kLeastRays = 8;
 constexpr int kLeastLaterRays = 4;
 
@@ -41,125 +41,55 @@ IrradianceCache::IrradianceCache(IrradianceCache&&) noexcept = default;
 IrradianceCache& IrradianceCache::operator=(IrradianceCache&&) noexcept = default;
 
 IrradianceCache::IrradianceCache(const World& world, const CausticGuide& guide, const TracerOptions& options)
-    : seed_(options.seed) {
-  assign_slots(world);
+    : cells_(world, options.focus), seed_(options.seed) {
+  for (std::uint32_t o = 0; o < world.scene.objects.size(); ++o) {
+    const auto nodes = static_cast<float>(cells_.node_count(o));
+    ray_share_.push_back(nodes > 0.0F ? std::clamp(kNodesWithAllRays / nodes, kLeastShare, 1.0F) : 1.0F);
+  }
   gather(world, guide, options);
 }
 
-void IrradianceCache::assign_slots(const World& world) {
-  slot_of_corner_.resize(world.scene.objects.size());
-  ray_share_.assign(world.scene.objects.size(), 1.0F);
-  std::uint32_t slots = 0;
-  for (std::size_t o = 0; o < world.scene.objects.size(); ++o) {
-    const Object& object = world.scene.objects[o];
-    const std::vector<int> materials = materials_of(object);
-    if (std::all_of(materials.begin(), materials.end(), [&](int material) {
-          return world.scene.materials[static_cast<std::size_t>(material)].albedo == glm::vec3(0.0F);
-        })) {
-      continue;
-    }
-    const TriangleMesh& mesh = object.mesh;
-    std::vector<std::uint32_t>& slot = slot_of_corner_[o];
-    const std::uint32_t before = slots;
-    slot.resize(3 * mesh.triangles.size(), kNoSlot);
-    if (!mesh.normals.empty()) {
-      std::vector<std::uint32_t> slot_of_vertex(mesh.positions.size(), kNoSlot);
-      for (std::size_t i = 0; i < slot.size(); ++i) {
-        std::uint32_t& s = slot_of_vertex[mesh.triangles[i / 3][static_cast<int>(i % 3)]];
-        if (s == kNoSlot) s = slots++;
-        slot[i] = s;
-      }
-    } else {
-      // A chain per vertex of the slots made there so far, each with the face normal that it stands for.
-      struct Entry {
-        glm::vec3 normal;
-        std::uint32_t slot;
-        std::uint32_t next;
-      };
-      std::vector<Entry> entries;
-      std::vector<std::uint32_t> first(mesh.positions.size(), kNoSlot);
-      for (std::size_t i = 0; i < slot.size(); ++i) {
-        const auto triangle = static_cast<std::uint32_t>(i / 3);
-        const glm::vec3 n = face_normal(world, static_cast<std::uint32_t>(o), triangle);
-        std::uint32_t& head = first[mesh.triangles[triangle][static_cast<int>(i % 3)]];
-        std::uint32_t e = head;
-        while (e != kNoSlot && glm::dot(entries[e].normal, n) < kSameFace) e = entries[e].next;
-        if (e == kNoSlot) {
-          entries.push_back({n, slots++, head});
-          e = head = static_cast<std::uint32_t>(entries.size() - 1);
-        }
-        slot[i] = entries[e].slot;
-      }
-    }
-    ray_share_[o] = std::clamp(kSlotsWithAllRays / static_cast<float>(slots - before), kLeastShare, 1.0F);
-  }
-
-  first_corner_.assign(slots + 1, 0);
-  for (const auto& object : slot_of_corner_) {
-    for (std::uint32_t s : object) ++first_corner_[s + 1];
-  }
-  for (std::size_t s = 0; s < slots; ++s) first_corner_[s + 1] += first_corner_[s];
-  corners_.resize(first_corner_.back());
-  std::vector<std::uint32_t> next(first_corner_.begin(), first_corner_.end() - 1);
-  for (std::size_t o = 0; o < slot_of_corner_.size(); ++o) {
-    for (std::size_t i = 0; i < slot_of_corner_[o].size(); ++i) {
-      corners_[next[slot_of_corner_[o][i]]++] = {static_cast<std::uint32_t>(o),
-                                                 static_cast<std::uint32_t>(i / 3),
-                                                 static_cast<std::uint32_t>(i % 3)};
-    }
-  }
-}
-
-glm::vec3 IrradianceCache::interpolate(const Sides& values, const Surface& surface) const {
-  const std::vector<std::uint32_t>& slots = slot_of_corner_[static_cast<std::size_t>(surface.object)];
-  if (slots.empty()) return glm::vec3(0.0F);
-  const std::uint32_t* slot = &slots[3 * std::size_t{surface.triangle}];
-  const std::vector<glm::vec3>& value = values.side[surface.front ? 0 : 1];
-  return tracing::interpolate(value, {slot[0], slot[1], slot[2]}, surface.barycentric);
-}
-
 std::array<Surface, IrradianceCache::kStartPoints> IrradianceCache::start_points(const World& world,
-                                                                                 std::size_t slot, int side,
+                                                                                 std::size_t node, int side,
                                                                                  std::uint32_t count) const {
-  const std::uint32_t first = first_corner_[slot];
-  const std::uint32_t corners = first_corner_[slot + 1] - first;
+  const std::span<const CacheCells::Corner> corners = cells_.corners(node);
   std::array<Surface, kStartPoints> starts;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const SampleStream stream = sample_stream(seed_, side_number(slot, side), i);
-    const TriangleCorner& corner = corners_[first + i % corners];
+    const SampleStream stream = sample_stream(seed_, side_number(node, side), i);
+    const CacheCells::Corner& corner = corners[i % corners.size()];
     const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
-    starts[i] = surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), side == 0 ? n : -n);
+    starts[i] = cells_.surface_near(world, corner, stream.get(dimension_base(0, 1)), side == 0 ? n : -n);
   }
   return starts;
 }
 
-glm::vec3 IrradianceCache::slot_caustics(const World& world, const CausticGuide& guide, std::size_t slot,
+glm::vec3 IrradianceCache::node_caustics(const World& world, const CausticGuide& guide, std::size_t node,
                                          int side, int rays) const {
   if (guide.knows_nothing()) return glm::vec3(0.0F);
   const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
-  const std::array<Surface, kStartPoints> starts = start_points(world, slot, side, start_count);
+  const std::array<Surface, kStartPoints> starts = start_points(world, node, side, start_count);
   glm::vec3 sum(0.0F);
   for (int r = 0; r < rays; ++r) {
     const auto index = static_cast<std::uint32_t>(r);
     sum += caustic_irradiance(world, guide, starts[index % start_count],
-                              sample_stream(seed_, side_number(slot, side), index));
+                              sample_stream(seed_, side_number(node, side), index));
   }
   return sum / static_cast<float>(rays);
 }
 
 template <typename IrradianceAt>
-IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std::size_t slot, int side,
+IrradianceCache::NodeGather IrradianceCache::gather_node(const World& world, std::size_t node, int side,
                                                          int rays, const IrradianceAt& irradiance_at) const {
-  const std::uint64_t number = side_number(slot, side);
+  const std::uint64_t number = side_number(node, side);
   const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
-  const std::array<Surface, kStartPoints> starts = start_points(world, slot, side, start_count);
+  const std::array<Surface, kStartPoints> starts = start_points(world, node, side, start_count);
 
-  SlotGather result;
+  NodeGather result;
   int traced = 0;
   int dark = 0;
   int nothing = 0;
-  // A slot with a share of the rays is given up as early in them as others are.
-  const int probe_rays = rays_of(slot, kProbeRays, kLeastRays);
+  // A node with a share of the rays is given up as early in them as others are.
+  const int probe_rays = rays_of(node, kProbeRays, kLeastRays);
   for (int r = 0; r < rays; ++r) {
     const bool hopeless = dark == traced || (side == 1 && dark + nothing == traced);
     if (r == probe_rays && hopeless) {
@@ -185,13 +115,13 @@ IrradianceCache::SlotGather IrradianceCache::gather_slot(const World& world, std
 }
 
 void IrradianceCache::gather(const World& world, const CausticGuide& guide, const TracerOptions& options) {
-  const std::size_t slots = first_corner_.size() - 1;
+  const std::size_t nodes = cells_.node_count();
   std::vector<std::uint8_t> buried[2];
   std::vector<std::uint8_t> given_up[2];
   for (int side = 0; side < 2; ++side) {
-    total_.side[side].assign(slots, glm::vec3(0.0F));
-    buried[side].assign(slots, 0);
-    given_up[side].assign(slots, 0);
+    total_.side[side].assign(nodes, glm::vec3(0.0F));
+    buried[side].assign(nodes, 0);
+    given_up[side].assign(nodes, 0);
   }
 
   Sides previous;
@@ -203,34 +133,58 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
                   : std::max(options.cache_rays / kLaterShare, std::min(options.cache_rays, kProbeRays));
     Sides found;
     for (int side = 0; side < 2; ++side) {
-      found.side[side].assign(slots, glm::vec3(0.0F));
-      parallel_for(slots, 32, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t slot = begin; slot < end; ++slot) {
-          if (given_up[side][slot] != 0) continue;
+      found.side[side].assign(nodes, glm::vec3(0.0F));
+      parallel_for(nodes, 32, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t node = begin; node < end; ++node) {
+          if (given_up[side][node] != 0) continue;
           poll_interrupt();
-          const int own = rays_of(slot, rays, pass == 0 ? kLeastRays : kLeastLaterRays);
-          const SlotGather gathered = pass == 0 ? gather_slot(world, slot, side, own, direct)
-                                                : gather_slot(world, slot, side, own, indirect);
-          found.side[side][slot] = gathered.irradiance;
+          const int own = rays_of(node, rays, pass == 0 ? kLeastRays : kLeastLaterRays);
+          const NodeGather gathered = pass == 0 ? gather_node(world, node, side, own, direct)
+                                                : gather_node(world, node, side, own, indirect);
+          found.side[side][node] = gathered.irradiance;
           if (pass > 0) continue;
           // Their bounce is gathered by the next pass.
           if (!gathered.given_up) {
-            found.side[side][slot] += slot_caustics(world, guide, slot, side, kCausticShare * own);
+            found.side[side][node] += node_caustics(world, guide, node, side, kCausticShare * own);
           }
-          buried[side][slot] = gathered.buried ? 1 : 0;
-          given_up[side][slot] = gathered.given_up ? 1 : 0;
+          buried[side][node] = gathered.buried ? 1 : 0;
+          given_up[side][node] = gathered.given_up ? 1 : 0;
         }
       });
       share_rays(found.side[side], buried[side]);
       fill_buried(found.side[side], buried[side]);
-      for (std::size_t i = 0; i < slots; ++i) total_.side[side][i] += found.side[side][i];
+      for (std::size_t i = 0; i < nodes; ++i) total_.side[side][i] += found.side[side][i];
     }
+    if (pass > 0 && pass + 1 == options.cache_bounces) add_further_bounces(previous, found);
     previous = std::move(found);
   }
 }
 
-int IrradianceCache::rays_of(std::size_t slot, int rays, int least) const {
-  const float share = ray_share_[corners_[first_corner_[slot]].object];
+void IrradianceCache::add_further_bounces(const Sides& before, const Sides& last) {
+  // A surface cannot pass on more than it got; a sum of few and noisy values may say so.
+  constexpr double kMostPassedOn = 0.95;
+  glm::dvec3 sum_before(0.0);
+  glm::dvec3 sum_last(0.0);
+  for (int side = 0; side < 2; ++side) {
+    for (const glm::vec3& value : before.side[side]) sum_before += glm::dvec3(value);
+    for (const glm::vec3& value : last.side[side]) sum_last += glm::dvec3(value);
+  }
+  glm::vec3 further(0.0F);
+  for (int c = 0; c < 3; ++c) {
+    if (!(sum_before[c] > 0.0)) continue;
+    const double passed_on = std::min(sum_last[c] / sum_before[c], kMostPassedOn);
+    further[c] = static_cast<float>(passed_on / (1.0 - passed_on));
+  }
+  for (int side = 0; side < 2; ++side) {
+    for (std::size_t i = 0; i < last.side[side].size(); ++i) {
+      total_.side[side][i] += further * last.side[side][i];
+    }
+  }
+}
+
+int IrradianceCache::rays_of(std::size_t node, int rays, int least) const {
+  const float share =
+      ray_share_[cells_.corners(node).front().object] * (cells_.is_vertex(node) ? 1.0F : kShareOfCuts);
   return std::max(static_cast<int>(share * static_cast<float>(rays)), std::min(rays, least));
 }
 
@@ -238,21 +192,19 @@ void IrradianceCache::share_rays(std::vector<glm::vec3>& values,
                                  const std::vector<std::uint8_t>& buried) const {
   const std::vector<glm::vec3> gathered = values;
   parallel_for(values.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t slot = begin; slot < end; ++slot) {
-      const std::uint32_t first = first_corner_[slot];
-      if (buried[slot] != 0 || ray_share_[corners_[first].object] == 1.0F) continue;
+    for (std::size_t node = begin; node < end; ++node) {
+      if (buried[node] != 0 || ray_share_[cells_.corners(node).front().object] == 1.0F) continue;
       glm::vec3 sum(0.0F);
       int count = 0;
-      for (std::uint32_t c = first; c < first_corner_[slot + 1]; ++c) {
-        const std::uint32_t* triangle =
-            &slot_of_corner_[corners_[c].object][3 * std::size_t{corners_[c].triangle}];
+      for (const CacheCells::Corner& corner : cells_.corners(node)) {
+        const glm::uvec3 around = cells_.nodes(corner);
         for (int k = 0; k < 3; ++k) {
-          if (buried[triangle[k]] != 0) continue;
-          sum += gathered[triangle[k]];
+          if (buried[around[k]] != 0) continue;
+          sum += gathered[around[k]];
           ++count;
         }
       }
-      values[slot] = sum / static_cast<float>(count);
+      values[node] = sum / static_cast<float>(count);
     }
   });
 }
@@ -264,25 +216,24 @@ void IrradianceCache::fill_buried(std::vector<glm::vec3>& values,
   std::vector<std::uint8_t> unknown = buried;
   for (int round = 0; round < kRounds; ++round) {
     std::vector<std::pair<std::uint32_t, glm::vec3>> found;
-    for (std::uint32_t slot = 0; slot < unknown.size(); ++slot) {
-      if (unknown[slot] == 0) continue;
+    for (std::uint32_t node = 0; node < unknown.size(); ++node) {
+      if (unknown[node] == 0) continue;
       glm::vec3 sum(0.0F);
       int count = 0;
-      for (std::uint32_t c = first_corner_[slot]; c < first_corner_[slot + 1]; ++c) {
-        const std::uint32_t* triangle =
-            &slot_of_corner_[corners_[c].object][3 * std::size_t{corners_[c].triangle}];
+      for (const CacheCells::Corner& corner : cells_.corners(node)) {
+        const glm::uvec3 around = cells_.nodes(corner);
         for (int k = 0; k < 3; ++k) {
-          if (unknown[triangle[k]] != 0) continue;
-          sum += values[triangle[k]];
+          if (unknown[around[k]] != 0) continue;
+          sum += values[around[k]];
           ++count;
         }
       }
-      if (count > 0) found.emplace_back(slot, sum / static_cast<float>(count));
+      if (count > 0) found.emplace_back(node, sum / static_cast<float>(count));
     }
     if (found.empty()) return;
-    for (const auto& [slot, value] : found) {
-      values[slot] = value;
-      unknown[slot] = 0;
+    for (const auto& [node, value] : found) {
+      values[node] = value;
+      unknown[node] = 0;
     }
   }
 }

@@ -16,16 +16,20 @@ const Scene& validated(const Scene& scene) {
   return scene;
 }
 
-const TracerOptions& validated(const TracerOptions& options) {
+const TracerOptions& validated(const TracerOptions& options, std::size_t objects) {
   check_range("cache_rays", options.cache_rays, 1, 65536);
   check_range("cache_bounces", options.cache_bounces, 1, 16);
+  if (options.focus >= 0 && static_cast<std::size_t>(options.focus) >= objects) {
+    throw InvalidArgument("focus", std::to_string(options.focus),
+                          "an object number below " + std::to_string(objects) + ", or less than 0 for none");
+  }
   return options;
 }
 
 }  // namespace
 
 Tracer::State::State(Scene scene, const TracerOptions& options)
-    : lit((validated(scene), std::move(scene)), validated(options)) {}
+    : lit((validated(options, validated(scene).objects.size()), std::move(scene)), options) {}
 
 void Tracer::State::check_object(const char* argument, int object) const {
   const auto count = static_cast<int>(lit.world.scene.objects.size());

@@ -61,7 +61,9 @@ std::vector<glm::vec3> Tracer::vertex_irradiance(int object, int rays, std::uint
         glm::vec3 n = face_normal(world, corner.object, corner.triangle);
         if (side == SurfaceSide::back) n = -n;
         if (n == glm::vec3(0.0F)) continue;
-        const Surface start = surface_near_corner(world, corner, stream.get(dimension_base(0, 1)), n);
+        const glm::vec3 weights = weights_near_corner(corner.corner, stream.get(dimension_base(0, 1)));
+        const Surface start =
+            surface_of_triangle(world, corner.object, corner.triangle, {weights.y, weights.z}, n);
         glm::vec3 found = direct_irradiance(world, start, stream.get(light_dimension), path);
         if (path) {
           found += std::numbers::pi_v<float> *

@@ -145,5 +145,6 @@ def _prepared(config: SceneConfig, point: Point | None) -> Stage:
         indirect=config.trace.indirect,
         cache_rays=config.trace.cache_rays,
         seed=config.trace.seed,
+        focus=built.reflector,
     )
     return Stage(config, built, _core.Tracer(built.scene, options))

@@ -94,7 +94,8 @@ class View:
         """Sums of the object's light over blocks, mean of the channels, and numbers of samples on it."""
         if indirect not in self._tracers:
             self._tracers[indirect] = _core.Tracer(
-                self._stage.built.scene, _core.TracerOptions(indirect=indirect)
+                self._stage.built.scene,
+                _core.TracerOptions(indirect=indirect, focus=self._stage.built.reflector),
             )
         options = _core.TraceOptions(
             samples_per_pixel=samples, max_specular_depth=8, max_diffuse_depth=16, seed=seed
@@ -166,7 +167,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.bias and (options.object or options.sky):
         parser.error("--bias is measured of the teapot in its room, without --object and --sky")
     if options.bias:
-        for mode, (mean, worst, error) in bias(64).items():
+        for mode, (mean, worst, error) in bias(1024).items():
             print(f"{mode}: {mean:+.1%} in the mean, {worst:+.1%} in the worst block, ±{error:.1%} at most")
         return
     view = View(options.object, options.sky)

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "barycentric.hpp"
+#include "mirrorbake/scene/scene.hpp"
+#include "surface.hpp"
+
+namespace mirrorbake::tracing {
+
+struct World;
+
+/// Cells of all diffuse surfaces, between whose corners the irradiance cache interpolates: triangles, and
+/// near the object in focus quarters of triangles, again and again. The corners of cells are the cache's
+/// nodes: one per vertex, or per face that meets there where faces are flat.
+class CacheCells {
+ public:
+  /// One of the cells that meet at a node.
+  struct Corner {
+    std::uint32_t object;
+    std::uint32_t triangle;
+    std::uint32_t cell;    ///< kNone: the whole triangle
+    std::uint32_t corner;  ///< 0…2
+  };
+  static constexpr std::uint32_t kNone = ~0U;
+
+  CacheCells() = default;
+  /// `focus`: number of an object, or less than 0 for none.
+  CacheCells(const World& world, int focus);
+
+  std::size_t node_count() const { return first_corner_.empty() ? 0 : first_corner_.size() - 1; }
+  /// Or a node that cuts have made.
+  bool is_vertex(std::size_t node) const { return node < vertex_nodes_; }
+  std::size_t node_count(std::uint32_t object) const { return nodes_of_object_[object]; }
+  std::span<const Corner> corners(std::size_t node) const {
+    return {corners_.data() + first_corner_[node], corners_.data() + first_corner_[node + 1]};
+  }
+  glm::uvec3 nodes(const Corner& corner) const {
+    return corner.cell == kNone ? triangle_nodes(corner.object, corner.triangle) : cells_[corner.cell].nodes;
+  }
+
+  /// Of `values` per node; 0 on objects without diffuse reflection.
+  glm::vec3 interpolate(const std::vector<glm::vec3>& values, const Surface& surface) const {
+    const auto object = static_cast<std::size_t>(surface.object);
+    if (nodes_of_corner_[object].empty()) return glm::vec3(0.0F);
+    if (!root_[object].empty()) {
+      const std::uint32_t root = root_[object][surface.triangle];
+      if (root != kNone) return interpolate_in_cells(values, root, surface.barycentric);
+    }
+    return tracing::interpolate(values, triangle_nodes(static_cast<std::uint32_t>(object), surface.triangle),
+                                surface.barycentric);
+  }
+
+  /// A random point of the cell near its corner, seen from the side of `towards`. `u` in [0,1)².
+  Surface surface_near(const World& world, const Corner& corner, glm::vec2 u, glm::vec3 towards) const;
+
+ private:
+  /// A triangle in focus, or a quarter of such a one.
+  struct Cell {
+    glm::uvec3 nodes{0};
+    glm::vec2 weights[3];              ///< of the triangle's second and third vertex, at the corners
+    std::uint32_t first_part = kNone;  ///< of four; the last one is the middle
+  };
+  class Refiner;
+
+  glm::uvec3 triangle_nodes(std::uint32_t object, std::uint32_t triangle) const {
+    const std::uint32_t* node = &nodes_of_corner_[object][3 * std::size_t{triangle}];
+    return {node[0], node[1], node[2]};
+  }
+  glm::vec3 interpolate_in_cells(const std::vector<glm::vec3>& values, std::uint32_t root,
+                                 glm::vec2 weights) const;
+  /// Nodes at the vertices of an object.
+  void add_object(const World& world, std::uint32_t object);
+  /// The cells that meet at each node.
+  void list_corners();
+  template <typename Visit>
+  void visit_cells(Visit visit) const;
+
+  std::uint32_t nodes_ = 0;
+  std::uint32_t vertex_nodes_ = 0;  ///< the first ones
+  std::vector<std::uint32_t> nodes_of_object_;
+  /// Three per triangle, per object; empty for objects without diffuse reflection.
+  std::vector<std::vector<std::uint32_t>> nodes_of_corner_;
+  /// The cell of each triangle, kNone for most, per object; empty for objects of which no triangle is cut.
+  std::vector<std::vector<std::uint32_t>> root_;
+  std::vector<Cell> cells_;
+  /// Corners of each node: corners_[first_corner_[node]] … corners_[first_corner_[node + 1]].
+  std::vector<std::uint32_t> first_corner_;
+  std::vector<Corner> corners_;
+};
+
+}  // namespace mirrorbake::tracing

@@ -30,6 +30,7 @@ struct OwnedDisplayView {
   std::vector<std::pair<int, float>> nodes;
   float weight;
   nb::object render;
+  LayerUse layers;
 };
 
 // Fits run without the interpreter's lock, which a renderer takes for each of its pictures.
@@ -79,22 +80,26 @@ of the reflector that the shell leaves out, or None if it covers all.)");
       .def(
           "__init__",
           [](OwnedDisplayView* self, const SurfaceSamples& lookups, const ViewTargets& targets,
-             std::vector<std::pair<int, float>> nodes, float weight, nb::object render) {
-            new (self) OwnedDisplayView{&lookups, &targets, std::move(nodes), weight, std::move(render)};
+             std::vector<std::pair<int, float>> nodes, float weight, nb::object render, bool layer_rows) {
+            new (self) OwnedDisplayView{
+                &lookups, &targets,          std::move(nodes),
+                weight,   std::move(render), layer_rows ? LayerUse::beside_pixels : LayerUse::start};
           },
           nb::arg("lookups"), nb::arg("targets"),
           nb::arg("nodes") = std::vector<std::pair<int, float>>{{0, 1.0F}}, nb::arg("weight") = 1.0F,
-          nb::arg("render") = nb::none(), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(),
+          nb::arg("render") = nb::none(), nb::arg("layer_rows") = true, nb::keep_alive<1, 2>(),
+          nb::keep_alive<1, 3>(),
           signature<R"(def __init__(self, lookups: SurfaceSamples, targets: ViewTargets,
 nodes: collections.abc.Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0,
-render: collections.abc.Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]] | None = None)
--> None)">(),
+render: collections.abc.Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]] | None = None,
+layer_rows: bool = True) -> None)">(),
           R"(lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at
 RunTimeModel.places). nodes: whose maps are blended for the view, with their weights. weight: of its
 rows, >= 0. render: draws the view with the texels of all maps of a node, float32 (texels, 4), premultiplied
 radiance and alpha, all levels as given, and returns float32 (lookups, height, width, 4): the light that the
 object reflects, times coverage, and coverage, of each lookup of a pixel; the view's rows are then probed from
-such pictures. None: they are analytic.)");
+such pictures. None: they are analytic. layer_rows: whether the rows of its layers, each by itself, stand
+beside its pixels'; else they only help to find alpha and where to start.)");
   nb::class_<DisplayFitOptions>(m, "DisplayFitOptions", "How maps are fitted to displayed pixels.")
       .def(
           "__init__",
@@ -134,8 +139,8 @@ void bind_fit(nb::module_& m) {
          std::optional<FloatMatrix> prior) {
         std::vector<DisplayView> display_views;
         for (const OwnedDisplayView* view : views) {
-          DisplayView& to = display_views.emplace_back(
-              DisplayView{view->lookups, view->targets, {}, view->weight, renderer_of(view->render)});
+          DisplayView& to = display_views.emplace_back(DisplayView{
+              view->lookups, view->targets, {}, view->weight, view->layers, renderer_of(view->render)});
           for (const auto& [node, weight] : view->nodes) to.nodes.push_back({node, weight});
         }
         std::vector<FitPart> fit_parts;

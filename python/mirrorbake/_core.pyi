@@ -1943,14 +1943,15 @@ class FitShell:
 class DisplayView:
     """A traced view, as the run time will look up its maps."""
 
-    def __init__(self, lookups: SurfaceSamples, targets: ViewTargets, nodes: Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0, render: Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]] | None = None) -> None:
+    def __init__(self, lookups: SurfaceSamples, targets: ViewTargets, nodes: Sequence[tuple[int, float]] = ((0, 1.0),), weight: float = 1.0, render: Callable[[numpy.typing.NDArray[numpy.float32]], numpy.typing.NDArray[numpy.float32]] | None = None, layer_rows: bool = True) -> None:
         """
         lookups: where the run time's lookups meet the reflector (Tracer.trace_visibility at
         RunTimeModel.places). nodes: whose maps are blended for the view, with their weights. weight: of its
         rows, >= 0. render: draws the view with the texels of all maps of a node, float32 (texels, 4), premultiplied
         radiance and alpha, all levels as given, and returns float32 (lookups, height, width, 4): the light that the
         object reflects, times coverage, and coverage, of each lookup of a pixel; the view's rows are then probed from
-        such pictures. None: they are analytic.
+        such pictures. None: they are analytic. layer_rows: whether the rows of its layers, each by itself, stand
+        beside its pixels'; else they only help to find alpha and where to start.
         """
 
 class DisplayFitOptions:

@@ -85,6 +85,9 @@ DisplayedTarget displayed_target(float image, float target, const DisplayFitOpti
   return {target, options.over_white * display_slope(image, options.softening)};
 }
 
+// How many times the tolerance a pass may end at whose image only gives the next one its weights.
+constexpr float kLeadingSlack = 3.0F;
+
 // The layers' own fit: all four channels of all maps.
 MapSolution fit_layers(std::span<const DisplayView> views, const std::vector<LayerRows>& rows,
                        const FitModel& model, int nodes, const SolveOptions& options,
@@ -114,7 +117,8 @@ MapSolution fit_layers(std::span<const DisplayView> views, const std::vector<Lay
       .solve({.channels = 4, .views = wanted, .initial = start});
 }
 
-// The pixels' rows of a view with its layers' rows below them.
+// The pixels' rows of a view with its layers' rows below them; of a view without layers' rows the matrix is
+// that of its pixels, and none is here.
 struct JointRows {
   RenderingMatrix matrix;
   std::vector<float> target, weights;  // rows × 3
@@ -133,8 +137,10 @@ void append(RenderingMatrix& to, const RenderingMatrix& from) {
 
 JointRows stack(const DisplayRows& pixels, const LayerRows& layers) {
   JointRows rows;
-  append(rows.matrix, pixels.matrix);
-  append(rows.matrix, layers.matrix);
+  if (!layers.target.empty()) {
+    append(rows.matrix, pixels.matrix);
+    append(rows.matrix, layers.matrix);
+  }
   rows.pixels = pixels.target.size();
   for (const glm::vec3& t : pixels.target) rows.target.insert(rows.target.end(), {t.x, t.y, t.z});
   for (const glm::vec4& t : layers.target) rows.target.insert(rows.target.end(), {t.x, t.y, t.z});
@@ -202,6 +208,9 @@ DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPa
     }
   }
   MapSolution start = fit_layers(views, layers, model, nodes, options.solve, prior);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (views[v].layers == LayerUse::start) layers[v] = {};
+  }
   std::vector<float> light(3 * texels), alpha(texels);
   for (std::size_t i = 0; i < texels; ++i) {
     for (std::size_t k = 0; k < 3; ++k) light[3 * i + k] = start.texels[4 * i + k];
@@ -223,7 +232,10 @@ DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPa
     fit.probing.most_of_a_map = std::max(fit.probing.most_of_a_map, report.most_of_a_map);
     fit.probing.unresolved += report.unresolved;
   }
-  for (std::size_t v = 0; v < views.size(); ++v) solver_views.push_back({&joint[v].matrix, views[v].nodes});
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const RenderingMatrix& rows = layers[v].target.empty() ? pixels[v].matrix : joint[v].matrix;
+    solver_views.push_back({&rows, views[v].nodes});
+  }
   const MapSolver solver(solver_views, maps, nodes, options.solve);
   // It has taken what it needs of them.
   for (JointRows& rows : joint) rows.matrix = {};
@@ -240,7 +252,8 @@ DisplayFit fit_display(std::span<const DisplayView> views, std::span<const FitPa
                                          .views = wanted,
                                          .prior = prior,
                                          .initial = light,
-                                         .unseen = last ? UnseenTexels::filled : UnseenTexels::as_before});
+                                         .unseen = last ? UnseenTexels::filled : UnseenTexels::as_before,
+                                         .slack = last ? 1.0F : kLeadingSlack});
     light = std::move(solution.texels);
     fit.passes.push_back(solution.report);
   }

@@ -119,7 +119,8 @@ ChannelSums LeastSquares::find_row_scale() {
 // between wrong bounds to the last digit is lost; a round that has left no bounds goes on. Clamping the
 // unbounded solution instead would be far from the best map: where the data leave a combination of texels
 // undetermined, large positive and negative ones cancel.
-SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const Bounds& bounds, Vector& x) {
+SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const Bounds& bounds,
+                                   double tolerance, Vector& x) {
   const std::size_t n = state_.unknowns();
   Iterate it{Vector(n), Vector(n), Vector(n), {}};
   evaluate(target, magnitude, it.step, it);
@@ -132,7 +133,6 @@ SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const 
     }
     return std::sqrt(worst);
   };
-  const double tolerance = static_cast<double>(state_.options.tolerance);
 
   SolveReport report;
   report.unknowns = n;

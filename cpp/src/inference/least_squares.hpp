@@ -43,8 +43,9 @@ class LeastSquares {
   Vector back_project(const Vector& target);
 
   /// Minimises Σ w |A x − target|² + scale · (regulariser + magnitude |x|²) within the bounds, starting from
-  /// x.
-  SolveReport minimise(const Vector& target, float magnitude, const Bounds& bounds, Vector& x);
+  /// x, until the gradient has shrunk to `tolerance`.
+  SolveReport minimise(const Vector& target, float magnitude, const Bounds& bounds, double tolerance,
+                       Vector& x);
 
   /// Σ w |A x − target|² of the x that was found.
   double data_squares() const { return data_squares_; }

@@ -83,6 +83,7 @@ namespace {
 
 void check(const SolveProblem& problem, const MapSolver::State& state) {
   check_range("channels", problem.channels, 1, 4);
+  check_at_least("slack", static_cast<double>(problem.slack), 1.0);
   const std::size_t c = static_cast<std::size_t>(problem.channels);
   check_length("views", problem.views.size(), state.rows.views(), "those of the solver");
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
@@ -171,7 +172,9 @@ MapSolution MapSolver::solve(const SolveProblem& problem) const {
   }
 
   MapSolution solution;
-  solution.report = system.minimise(wanted, problem.prior.empty() ? 0.0F : s.options.prior_weight, bounds, x);
+  const float magnitude = problem.prior.empty() ? 0.0F : s.options.prior_weight;
+  solution.report =
+      system.minimise(wanted, magnitude, bounds, static_cast<double>(problem.slack * s.options.tolerance), x);
   const double weight = sum_of(row_weights, problem.channels);
   solution.report.rms_error = weight > 0 ? std::sqrt(system.data_squares() / weight) : 0.0;
 

@@ -34,6 +34,8 @@ class FitView:
     """Of the fit whose maps are blended for it, with their weights."""
     weight: float = 1.0
     """Of its pixels."""
+    layer_rows: bool = True
+    """Whether its layers, each by itself, have rows beside those of its pixels."""
 
 
 def solve_options(infer: Infer) -> _core.SolveOptions:
@@ -111,6 +113,7 @@ class DisplayFitter:
                     list(one.nodes),
                     one.weight,
                     self._split(one.view.draw),
+                    one.layer_rows,
                 )
                 for one in views
             ],

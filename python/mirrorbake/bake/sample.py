@@ -231,7 +231,8 @@ class SampleBaker:
         if infer.neighbours > 0.0:
             mine = ((number[index], 1.0),)
             views += [
-                FitView(trace(space.sample(other)), mine, infer.neighbours) for other in beside(space, index)
+                FitView(trace(space.sample(other)), mine, infer.neighbours, layer_rows=False)
+                for other in beside(space, index)
             ]
         count = self._stage.config.views.around
         assert count is not None, "the scene has to be planned first"
@@ -239,7 +240,8 @@ class SampleBaker:
             for place in places_around(self._stage.built.cameras, space.sample(index), count):
                 beside_it = self._tracer.around(place.azimuth, place.elevation)
                 if beside_it is not None:
-                    views.append(FitView(beside_it, ((number[index], 1.0),), place.weight))
+                    mine = ((number[index], 1.0),)
+                    views.append(FitView(beside_it, mine, place.weight, layer_rows=False))
         return nodes, views
 
     def _fit_layers(

@@ -45,7 +45,7 @@ class Infer(Section):
     less is sharper for supersampled images."""
     iterations: Annotated[int, Field(ge=0, le=100_000)] = 600
     """At most, per layer and view."""
-    tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-2
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 3e-2
     """The solver stops when its gradient has shrunk to this fraction."""
 
     @model_validator(mode="after")

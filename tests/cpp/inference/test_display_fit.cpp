@@ -235,6 +235,26 @@ TEST(DisplayFit, ComesNearerToThePixelsThanLayersApart) {
             0.8 * display_error(samples, targets, layers.texels));
 }
 
+TEST(DisplayFit, LayersThatOnlyStartLeaveNoRowsBesideThePixels) {
+  const SurfaceSamples samples = ball(32, 4, [](const SurfaceSamples& s, std::size_t i, std::size_t k) {
+    const float x = 0.5F + 0.5F * std::sin(40.0F * s.position[i].x) * std::cos(30.0F * s.position[i].y);
+    return k == 0 ? glm::vec4(0.2F * x, 0.1F * x, 0.0F, x) : glm::vec4(1.0F - x, x, 0.3F + x * x, 1.0F);
+  });
+  const ViewTargets targets = targets_of(samples);
+  DisplayView view{&samples, &targets};
+  const DisplayFit beside = fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), precise());
+  DisplayFitOptions weightless = precise();
+  weightless.layer_weight = 0.0F;
+  const DisplayFit expected = fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), weightless);
+  view.layers = LayerUse::start;
+  const DisplayFit fit = fit_display({&view, 1}, kParts, kMaps, 1, web_run_time(), precise());
+  const double error = display_error(samples, targets, fit.texels);
+  // The two solves end at different places within the tolerance.
+  EXPECT_NEAR(error, display_error(samples, targets, expected.texels), 1e-4);
+  EXPECT_LT(error, 0.98 * display_error(samples, targets, beside.texels));
+  for (std::size_t i = 3; i < fit.texels.size(); i += 4) ASSERT_EQ(fit.texels[i], beside.texels[i]);
+}
+
 // Lamps of a hundred times white in every seventh of the directions, small beside what reads a texel.
 SurfaceSamples lamplit_ball() {
   return ball(40, 4, [](const SurfaceSamples& s, std::size_t i, std::size_t k) {

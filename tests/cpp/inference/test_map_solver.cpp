@@ -490,6 +490,19 @@ TEST(MapSolver, ReportsWhetherItConverged) {
   for (float value : hasty.texels) ASSERT_TRUE(std::isfinite(value) && value >= 0.0F);
 }
 
+TEST(MapSolver, SlackEndsASolveThatLeadsToAnotherEarlier) {
+  const Problem problem = make_problem(48, 4, 32);
+  const std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);
+  const MapSolver solver = make_solver(problem.matrix, problem.layout, {.max_iterations = 2000});
+  const ViewTarget view{target, problem.row_weights};
+  const SolveReport whole = solver.solve({.channels = 1, .views = {&view, 1}}).report;
+  const SolveReport rough = solver.solve({.channels = 1, .views = {&view, 1}, .slack = 30.0F}).report;
+  EXPECT_TRUE(rough.converged);
+  EXPECT_LE(rough.relative_gradient, 30.0 * 1e-3);
+  EXPECT_LT(rough.iterations, whole.iterations);
+  EXPECT_THROW(solver.solve({.channels = 1, .views = {&view, 1}, .slack = 0.5F}), InvalidArgument);
+}
+
 TEST(MapSolver, RowWeightsFollowCoverageAndDisplayedBrightness) {
   const Problem problem = make_problem(16, 4, 8);
   const std::vector<float> dark(3 * problem.matrix.rows(), 0.0F);

@@ -36,12 +36,19 @@ using FitPart = std::vector<FitShell>;
 /// what all of them read together would take too many colours to tell apart.
 using MapRenderer = std::function<std::vector<float>(std::span<const float> texels)>;
 
+/// What the layers of a view, each by itself, are for.
+enum class LayerUse {
+  beside_pixels,  ///< to find α and where to start, then as rows beside the pixels'
+  start,          ///< the first alone: of views beside others, whose pixels are all that is asked of the maps
+};
+
 /// A traced view, as the run time will look up its maps.
 struct DisplayView {
   const SurfaceSamples* lookups = nullptr;  ///< where the run time's lookups meet the reflector
   const ViewTargets* targets = nullptr;
   std::vector<NodeWeight> nodes = {{}};  ///< whose maps are blended for it
   float weight = 1.0F;                   ///< of its rows, ≥ 0
+  LayerUse layers = LayerUse::beside_pixels;
   /// Its rows are probed from pictures of this renderer (`probe.hpp`); none: analytic, from the lookups.
   MapRenderer render = {};
 };
@@ -81,7 +88,8 @@ struct DisplayFit {
 /// shells in front by the α of the layers' own fit; target: the traced pixel less its diffuse light; weight:
 /// coverage times the squared derivative of the display's curve (sRGB) at the model's own image, since at a
 /// noisy target it would prefer what came out dark. A target over white asks no more than white of an image
-/// below it. Beside them, weighted by μ, the rows of every layer by itself. `prior`: empty, or nodes × texels
+/// below it. Beside them, weighted by μ, the rows of every layer by itself, of the views whose
+/// `layers` say so. `prior`: empty, or nodes × texels
 /// × 3.
 ///
 /// F enters per channel: a row's weights follow the mean of its channels, each channel's scale its own, which

@@ -92,6 +92,8 @@ struct SolveProblem {
                                        std::numeric_limits<float>::infinity(),
                                        std::numeric_limits<float>::infinity(), 1.0F};
   UnseenTexels unseen = UnseenTexels::filled;
+  /// How many times SolveOptions::tolerance this solve may end at, ≥ 1: of one that only leads to another.
+  float slack = 1.0F;
 };
 
 struct MapSolution {

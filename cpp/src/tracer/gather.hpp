@@ -37,7 +37,8 @@ inline glm::vec3 weights_near_corner(std::uint32_t corner, glm::vec2 u) {
   return weights;
 }
 
-/// A point of a triangle, seen from the side of `towards`. `weights` are those of the second and third corner.
+/// A point of a triangle, seen from the side of `towards`. `weights` are those of the second and third
+/// corner.
 inline Surface surface_of_triangle(const World& world, std::uint32_t object, std::uint32_t triangle,
                                    glm::vec2 weights, glm::vec3 towards) {
   const Hit hit{0.0F, object, triangle, weights.x, weights.y};

@@ -14,15 +14,15 @@ namespace mirrorbake::tracing {
 struct World;
 class CausticGuide;
 
-/// Indirect irradiance at the nodes of CacheCells, one value per side (IndirectLight::cached): light by way of
-/// specular or diffuse surfaces.
+/// Indirect irradiance at the nodes of CacheCells, one value per side (IndirectLight::cached): light by way
+/// of specular or diffuse surfaces.
 ///
 /// Each pass gathers one more diffuse bounce: rays with a cosine distribution leave points around a node, and
-/// pick up the direct light (first pass) or the previous pass's irradiance where they land. A ray that
-/// lands on a mirror follows it a few bounces, without the emission seen that way: rays that the guide aims
-/// find those caustics with less noise, in the first pass. Nodes buried in another body see only the dark
-/// inside of it; they take the value of their neighbours, or triangles that stick out of the body would fade
-/// to black.
+/// pick up the direct light (first pass) or the previous pass's irradiance where they land. A ray that lands
+/// on a mirror follows it a few bounces, without the emission seen that way: rays that the guide aims find
+/// those caustics with less noise, in the first pass. Nodes buried in another body see only the dark inside
+/// of it; they take the value of their neighbours, or triangles that stick out of the body would fade to
+/// black.
 ///
 /// On an object of many nodes each one takes fewer rays and the mean with its neighbours, whose rays it
 /// shares: what is gathered is as noisy as elsewhere, and blurred over distances that are small there.

@@ -42,8 +42,8 @@ struct TracerOptions {
   int cache_rays = 64;
   int cache_bounces = 6;   ///< diffuse bounces that `cached` follows, 1…16
   std::uint64_t seed = 0;  ///< of the cache
-  /// Object that mirrors what is close to it, so that the cache has more points there than the vertices: as
-  /// near as a seventh of their distance. Less than 0: none.
+  /// Object that mirrors what is close to it: around it the cache has more points than the vertices of other
+  /// objects, a tenth of their distance from it apart. Less than 0: none.
   int focus = -1;
 };
 

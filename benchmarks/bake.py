@@ -93,8 +93,13 @@ def qualities() -> Iterator[Case]:
         paper = PAPER_TRACE_S + PAPER_INFER_S
         yield Case(
             f"the paper's teapot, {quality} quality, one more of 100 views",
-            "s per view", more, paper, "[PEM], 2001", 0.0, 0.0,
-        )  # fmt: skip
+            "s per view",
+            more,
+            paper,
+            "[PEM], 2001",
+            0.0,
+            0.0,
+        )
 
 
 def drawing() -> Iterator[Case]:
@@ -160,9 +165,14 @@ def drawing() -> Iterator[Case]:
             ("a mirror ball's maps solved for", "s per view", fitted),
         ):
             yield Case(
-                f"{what}, {SIZE}² pixels, beside a frame of our error", unit, spent, to_our_error,
-                f"mitsuba {name}", ours, theirs,
-            )  # fmt: skip
+                f"{what}, {SIZE}² pixels, beside a frame of our error",
+                unit,
+                spent,
+                to_our_error,
+                f"mitsuba {name}",
+                ours,
+                theirs,
+            )
 
 
 def cases() -> Iterator[Case]:

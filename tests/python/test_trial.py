@@ -56,7 +56,7 @@ def test_the_trial_foretells_what_the_bake_reaches(tmp_path: Path) -> None:
     # the trial's reference has few samples, whose noise it takes off, but not without an error: on the sample
     # 64 a half say 31.9 dB and 1024 say 29.7.
     assert decibels(pem, "pem", 0.0) == pytest.approx(trial.on, abs=2.5)
-    assert decibels(pem, "pem", 0.5) == pytest.approx(trial.between, abs=1.5)
+    assert decibels(pem, "pem", 0.5) == pytest.approx(trial.between, abs=2.5)
     assert decibels(pem, "static_infinite", 0.5) == pytest.approx(trial.captured, abs=0.3)
 
 

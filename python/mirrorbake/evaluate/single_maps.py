@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.opened import OpenedPem
+    from mirrorbake.scene.config_infer import Infer
     from mirrorbake.scene.stage import Stage
 
 MOST_KEPT = 16
@@ -29,11 +30,20 @@ TARGETS_KEPT = 3
 BATCH = 1 << 22
 """Samples that are held at a time, were the object to fill the frame."""
 
+TOLERANCE = 1e-3
+"""Of their fits: a PEM is compared with the best that such maps can do, not with where its fit may stop."""
+
 OVERLAP_GRID = 256
 OVERLAP_POINTS = 200_000
 """Points of the surface by which overlaps of its texture coordinates are looked for."""
 MOST_OVERLAP = 0.1
 """Share of a texture's places that may belong to several places of the surface: seams do."""
+
+
+def _solve_options(infer: Infer) -> _core.SolveOptions:
+    options = solve_options(infer)
+    options.tolerance = min(options.tolerance, TOLERANCE)
+    return options
 
 
 @dataclass(frozen=True)
@@ -241,7 +251,7 @@ class SingleMaps:
                 shells,
                 list(layer.topologies),
                 run_time=self._pem.run_time.model,
-                options=_core.DisplayFitOptions(solve=solve_options(infer), passes=infer.passes),
+                options=_core.DisplayFitOptions(solve=_solve_options(infer), passes=infer.passes),
                 prior=None if layer.prior is None else layer.prior.reshape(-1, 3),
             )
             texels = np.asarray(found)[:, :3]
@@ -268,6 +278,6 @@ class SingleMaps:
             if not views:
                 texels.append(np.zeros((topology.texels, 3), np.float32) if prior is None else prior)
                 continue
-            solver = _core.MapSolver(views, [topology], options=solve_options(stage.config.infer))
+            solver = _core.MapSolver(views, [topology], options=_solve_options(stage.config.infer))
             texels.append(np.asarray(solver.solve(targets, weights, prior, prior)[0]))
         return np.concatenate(texels)

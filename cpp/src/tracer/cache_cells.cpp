@@ -171,7 +171,6 @@ CacheCells::CacheCells(const World& world, int focus) {
   nodes_of_object_.resize(objects, 0);
   root_.resize(objects);
   for (std::uint32_t o = 0; o < objects; ++o) add_object(world, o);
-  vertex_nodes_ = nodes_;
   if (focus >= 0) Refiner(world, focus, *this).cut_triangles();
   list_corners();
 }

@@ -33,8 +33,6 @@ class CacheCells {
   CacheCells(const World& world, int focus);
 
   std::size_t node_count() const { return first_corner_.empty() ? 0 : first_corner_.size() - 1; }
-  /// Or a node that cuts have made.
-  bool is_vertex(std::size_t node) const { return node < vertex_nodes_; }
   std::size_t node_count(std::uint32_t object) const { return nodes_of_object_[object]; }
   std::span<const Corner> corners(std::size_t node) const {
     return {corners_.data() + first_corner_[node], corners_.data() + first_corner_[node + 1]};
@@ -81,7 +79,6 @@ class CacheCells {
   void visit_cells(Visit visit) const;
 
   std::uint32_t nodes_ = 0;
-  std::uint32_t vertex_nodes_ = 0;  ///< the first ones
   std::vector<std::uint32_t> nodes_of_object_;
   /// Three per triangle, per object; empty for objects without diffuse reflection.
   std::vector<std::vector<std::uint32_t>> nodes_of_corner_;

@@ -49,6 +49,8 @@ inline Surface surface_of_triangle(const World& world, std::uint32_t object, std
 /// estimation has it, and `caustic_irradiance` that which mirrors show.
 struct Gathered {
   glm::vec3 radiance{0.0F};
+  glm::vec3 by_mirrors{0.0F};   ///< of it, what specular surfaces have shown
+  Hit first;                    ///< with the first surface
   bool nothing = false;         ///< the ray left the scene
   bool dark_back_side = false;  ///< it hit the inside of a body, and no light was there
 };
@@ -68,10 +70,13 @@ Gathered gather_along(const World& world, Ray ray, const SampleStream& stream,
       return result;
     }
     const Surface surface = surface_at(world.scene, world.rays, hit, ray.direction);
+    if (bounce == 0) result.first = hit;
     if (surface.albedo != glm::vec3(0.0F)) {
       const glm::vec2 u = stream.get(dimension_base(bounce, 0) + light_dimension);
-      result.radiance +=
+      const glm::vec3 reflected =
           throughput * surface.albedo * std::numbers::inv_pi_v<float> * irradiance_at(surface, u);
+      result.radiance += reflected;
+      if (bounce > 0) result.by_mirrors += reflected;
     }
     if (bounce == 0) result.dark_back_side = !surface.front && result.radiance == glm::vec3(0.0F);
     if (!surface.specular() || bounce == kSpecularBounces) return result;

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "barycentric.hpp"
+#include "bright_surfaces.hpp"
 #include "gather.hpp"
 #include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -22,14 +23,26 @@ constexpr int kProbeRays = 16;
 constexpr int kLaterShare = 4;
 // Caustics are as sharp as the mirrors: as many times the rays of the first pass, where there are any.
 constexpr int kCausticShare = 4;
+// Bright surfaces are few and small: as many times fewer rays than the first pass.
+constexpr int kBrightShare = 4;
 // Nodes of an object up to which each takes all of its rays; beyond it the object's rays are as many as these
 // have, down to a share that the mean with a node and its ring of six makes up for.
 constexpr float kNodesWithAllRays = 16384.0F;
 constexpr float kLeastShare = 0.2F;
-// Nodes that cuts have made lie close together, where pictures show several in the place of one.
-constexpr float kShareOfCuts = 0.5F;
 constexpr int kLeastRays = 8;
 constexpr int kLeastLaterRays = 4;
+
+// How many rays per solid angle go towards a hit: of `rays` along the cosine, and of `bright_rays` to bright
+// surfaces.
+float mean_rays(const World& world, const BrightSurfaces& bright, const Ray& ray, const Hit& hit,
+                float cosine, int rays, int bright_rays) {
+  const float along_cosine = static_cast<float>(rays) * cosine * std::numbers::inv_pi_v<float>;
+  const float density = bright.density(hit.geometry, hit.triangle);
+  if (density == 0.0F) return along_cosine;
+  const float there = std::abs(glm::dot(world.geometric_normal(ray, hit), ray.direction));
+  return along_cosine +
+         static_cast<float>(bright_rays) * density * hit.distance * hit.distance / std::max(there, 1e-6F);
+}
 
 }  // namespace
 
@@ -77,9 +90,38 @@ glm::vec3 IrradianceCache::node_caustics(const World& world, const CausticGuide&
   return sum / static_cast<float>(rays);
 }
 
+glm::vec3 IrradianceCache::from_bright(const World& world, const BrightSurfaces& bright, std::size_t node,
+                                       int side, int rays, int bright_rays) const {
+  const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(bright_rays));
+  const std::array<Surface, kStartPoints> starts = start_points(world, node, side, start_count);
+  glm::vec3 sum(0.0F);
+  for (int r = 0; r < bright_rays; ++r) {
+    const auto index = static_cast<std::uint32_t>(r);
+    const SampleStream stream = sample_stream(seed_, side_number(node, side), index);
+    const Surface& start = starts[index % start_count];
+    const BrightSurfaces::Point point = bright.sample(stream.get(dimension_base(0, 1) + guide_dimension));
+    const glm::vec3 position =
+        surface_of_triangle(world, point.object, point.triangle, point.barycentric, start.normal).position;
+    const glm::vec3 direction = glm::normalize(position - start.position);
+    const float cosine = glm::dot(start.normal, direction);
+    if (!(cosine > 0.0F && glm::dot(start.geometric_normal, direction) > 0.0F)) continue;
+    const Ray ray{offset_origin(start, direction), direction};
+    const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
+    if (hit.geometry != point.object || hit.triangle != point.triangle) continue;
+    const Surface surface = surface_at(world.scene, world.rays, hit, direction);
+    const glm::vec2 u = stream.get(dimension_base(0, 1) + light_dimension);
+    const glm::vec3 radiance =
+        surface.albedo * std::numbers::inv_pi_v<float> * direct_irradiance(world, surface, u, false);
+    sum += radiance * cosine / mean_rays(world, bright, ray, hit, cosine, rays, bright_rays);
+  }
+  return sum;
+}
+
 template <typename IrradianceAt>
 IrradianceCache::NodeGather IrradianceCache::gather_node(const World& world, std::size_t node, int side,
-                                                         int rays, const IrradianceAt& irradiance_at) const {
+                                                         int rays, const BrightSurfaces& bright,
+                                                         int bright_rays,
+                                                         const IrradianceAt& irradiance_at) const {
   const std::uint64_t number = side_number(node, side);
   const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
   const std::array<Surface, kStartPoints> starts = start_points(world, node, side, start_count);
@@ -102,9 +144,15 @@ IrradianceCache::NodeGather IrradianceCache::gather_node(const World& world, std
     const glm::vec3 direction =
         sample_cosine_hemisphere(Frame(start.normal), stream.get(dimension_base(0, 0) + diffuse_dimension));
     if (!(glm::dot(direction, start.geometric_normal) > 0.0F)) continue;
-    const Gathered gathered =
-        gather_along(world, {offset_origin(start, direction), direction}, stream, irradiance_at);
-    result.irradiance += gathered.radiance;
+    const Ray ray{offset_origin(start, direction), direction};
+    const Gathered gathered = gather_along(world, ray, stream, irradiance_at);
+    float share = 1.0F;
+    if (bright_rays > 0 && gathered.first.geometry < world.scene.objects.size()) {
+      const float cosine = glm::dot(start.normal, direction);
+      share = static_cast<float>(rays) * cosine * std::numbers::inv_pi_v<float> /
+              mean_rays(world, bright, ray, gathered.first, cosine, rays, bright_rays);
+    }
+    result.irradiance += share * (gathered.radiance - gathered.by_mirrors) + gathered.by_mirrors;
     dark += gathered.dark_back_side ? 1 : 0;
     nothing += gathered.nothing ? 1 : 0;
     ++traced;
@@ -118,6 +166,7 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
   const std::size_t nodes = cells_.node_count();
   std::vector<std::uint8_t> buried[2];
   std::vector<std::uint8_t> given_up[2];
+  const BrightSurfaces bright(world, seed_);
   for (int side = 0; side < 2; ++side) {
     total_.side[side].assign(nodes, glm::vec3(0.0F));
     buried[side].assign(nodes, 0);
@@ -139,12 +188,16 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
           if (given_up[side][node] != 0) continue;
           poll_interrupt();
           const int own = rays_of(node, rays, pass == 0 ? kLeastRays : kLeastLaterRays);
-          const NodeGather gathered = pass == 0 ? gather_node(world, node, side, own, direct)
-                                                : gather_node(world, node, side, own, indirect);
+          const int to_bright = pass > 0 || bright.empty() ? 0 : std::max(own / kBrightShare, 1);
+          const NodeGather gathered = pass == 0
+                                          ? gather_node(world, node, side, own, bright, to_bright, direct)
+                                          : gather_node(world, node, side, own, bright, to_bright, indirect);
           found.side[side][node] = gathered.irradiance;
           if (pass > 0) continue;
           // Their bounce is gathered by the next pass.
           if (!gathered.given_up) {
+            if (to_bright > 0)
+              found.side[side][node] += from_bright(world, bright, node, side, own, to_bright);
             found.side[side][node] += node_caustics(world, guide, node, side, kCausticShare * own);
           }
           buried[side][node] = gathered.buried ? 1 : 0;
@@ -183,8 +236,7 @@ void IrradianceCache::add_further_bounces(const Sides& before, const Sides& last
 }
 
 int IrradianceCache::rays_of(std::size_t node, int rays, int least) const {
-  const float share =
-      ray_share_[cells_.corners(node).front().object] * (cells_.is_vertex(node) ? 1.0F : kShareOfCuts);
+  const float share = ray_share_[cells_.corners(node).front().object];
   return std::max(static_cast<int>(share * static_cast<float>(rays)), std::min(rays, least));
 }
 

@@ -12,6 +12,7 @@
 namespace mirrorbake::tracing {
 
 struct World;
+class BrightSurfaces;
 class CausticGuide;
 
 /// Indirect irradiance at the nodes of CacheCells, one value per side (IndirectLight::cached): light by way
@@ -20,7 +21,8 @@ class CausticGuide;
 /// Each pass gathers one more diffuse bounce: rays with a cosine distribution leave points around a node, and
 /// pick up the direct light (first pass) or the previous pass's irradiance where they land. A ray that lands
 /// on a mirror follows it a few bounces, without the emission seen that way: rays that the guide aims find
-/// those caustics with less noise, in the first pass. Nodes buried in another body see only the dark inside
+/// those caustics with less noise, in the first pass, as rays to points of BrightSurfaces do with what these
+/// reflect. Nodes buried in another body see only the dark inside
 /// of it; they take the value of their neighbours, or triangles that stick out of the body would fade to
 /// black.
 ///
@@ -59,9 +61,14 @@ class IrradianceCache {
     bool buried = false;    ///< most rays hit the dark inside of a body
     bool given_up = false;  ///< the first rays found that, or, on a back side, nothing at all
   };
+  /// What bright surfaces reflect is weighted for a partner that takes `bright_rays` rays to them.
   template <typename IrradianceAt>
   NodeGather gather_node(const World& world, std::size_t node, int side, int rays,
+                         const BrightSurfaces& bright, int bright_rays,
                          const IrradianceAt& irradiance_at) const;
+  /// That partner: irradiance by `bright_rays` rays to bright surfaces beside `rays` along the cosine.
+  glm::vec3 from_bright(const World& world, const BrightSurfaces& bright, std::size_t node, int side,
+                        int rays, int bright_rays) const;
   /// Random points around a node, seen from one side; `count` ≤ kStartPoints.
   std::array<Surface, kStartPoints> start_points(const World& world, std::size_t node, int side,
                                                  std::uint32_t count) const;

@@ -24,6 +24,7 @@ from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.study.trade import maps, show
 from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of
 from mirrorbake.study.trade.drawing import FILTERS, Drawing, draw_samples
+from mirrorbake.study.trade.notebook import Identity
 from mirrorbake.study.trade.stability import combinations_of, compare, read_study
 from mirrorbake.study.trade.study import STUDY_NAME, Study, advice, shrunk, singles_of, study
 from mirrorbake.study.trade.trial import Bench, Trial, overridden
@@ -394,9 +395,9 @@ def test_a_study_keeps_to_its_time_and_goes_on(tmp_path: Path) -> None:
 
 def test_another_seed_tries_the_same_combinations(studied: tuple[Path, Study], tmp_path: Path) -> None:
     folder, result = studied
-    other = read_study(folder)
-    assert sorted(map(str, combinations_of(other))) == sorted(map(str, combinations_of(result)))
     seeded = parse_config({**SCENE, "trace": {**SCENE["trace"], "seed": 7}}, "scene")
+    other = read_study(folder, Identity.of(seeded))
+    assert sorted(map(str, combinations_of(other))) == sorted(map(str, combinations_of(result)))
     again = study(seeded, tmp_path, STUDIED, again=combinations_of(other))
     assert [trial.settings for trial in again.all] == [trial.settings for trial in result.all]
     stability = compare(again, other)
@@ -405,7 +406,35 @@ def test_another_seed_tries_the_same_combinations(studied: tuple[Path, Study], t
     # same ones.
     assert 0.0 < stability.deviation < 3.0
     with pytest.raises(InputError, match="expected a study"):
-        read_study(tmp_path / "none")
+        read_study(tmp_path / "none", Identity.of(seeded))
+    with pytest.raises(InputError, match=r"under seed \d+, too; expected one under another seed"):
+        read_study(folder, Identity.of(parse_config(SCENE, "scene")))
+    smaller = {**SCENE, "maps": {"size": 8, "distant": "box"}}
+    with pytest.raises(InputError, match="another scene"):
+        read_study(folder, Identity.of(parse_config(smaller, "scene")))
+
+
+def test_the_command_says_what_of_a_front_another_seed_leaves(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        "[views]\ncount = 3\nsize = [24, 18]\n[maps]\nsize = 8\n[trace]\nsamples = 4\n"
+        "[layers]\ndiffuse = false\nlocal = false\n"
+    )
+    arguments = ["study", str(scene), "--axes", "storage,coordinates"]
+    first = [*arguments, "--out", str(tmp_path / "first")]
+    assert CliRunner().invoke(app, first).exit_code == 0
+    other = [*arguments, "--against", str(tmp_path / "first"), "--out", str(tmp_path / "second")]
+    same = CliRunner().invoke(app, other)
+    assert same.exit_code == 3
+    assert "another seed (--seed)" in same.stderr
+    assert not (tmp_path / "second").exists()
+    words = CliRunner().invoke(app, [*other, "--seed", "1"])
+    assert words.exit_code == 0, words.stderr
+    assert "under the other seed" in words.stdout
+    assert "of the other's front are on this one" in words.stdout
+    figures = json.loads(CliRunner().invoke(app, [*other, "--seed", "1", "--json"]).stdout)
+    assert figures["stability"]["trials"] == len(figures["trials"])
+    assert 0.0 < figures["stability"]["deviation"] <= figures["stability"]["largest"]
 
 
 def test_a_folder_with_another_study_is_refused(studied: tuple[Path, Study], tmp_path: Path) -> None:

@@ -89,12 +89,13 @@ def scene_command(
     `mirrorbake study SCENE.toml` is short for it.
     """
     from mirrorbake.study.trade import show
+    from mirrorbake.study.trade.notebook import Identity
     from mirrorbake.study.trade.stability import combinations_of, compare, read_study
-    from mirrorbake.study.trade.study import advice, study
+    from mirrorbake.study.trade.study import advice, shrunk, study
 
     config = scene_config(scene, assignments, None, None, None, None, seed)
     names = [name.strip() for name in axes.split(",") if name.strip()]
-    other = None if against is None else read_study(against)
+    other = None if against is None else read_study(against, Identity.of(shrunk(config, pixels)))
     again = None if other is None else combinations_of(other)
     with _core.ThreadLimit(threads), progress() as add_bar:
         result = study(config, out, names, minutes, add_bar("study"), longest_side=pixels, again=again)

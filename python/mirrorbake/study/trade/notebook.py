@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mirrorbake import _core
 from mirrorbake.errors import InputError
 from mirrorbake.files import write_text
+from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.study.trade.trial import Trial
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from mirrorbake.scene.config import SceneConfig
     from mirrorbake.study.trade.axes import Setting
     from mirrorbake.study.trade.trial import Bench
 
@@ -24,10 +28,28 @@ def words_of(settings: Mapping[str, Setting]) -> str:
     return ", ".join(f"{axis} {setting.label}" for axis, setting in settings.items())
 
 
+@dataclass(frozen=True)
+class Identity:
+    """What a study may go on with, or be compared with."""
+
+    scene: str
+    """Changes with the scene, its files and the library, not with the seed."""
+    seed: int
+
+    @classmethod
+    def of(cls, config: SceneConfig) -> Identity:
+        """The identity of a scene as it is studied."""
+        inputs = {key: {**value, "path": None} for key, value in hash_inputs(config).items()}
+        scene = json.loads(config.model_dump_json())
+        seed = scene["trace"].pop("seed")
+        text = json.dumps([_core.version(), scene, inputs], sort_keys=True)
+        return cls(hashlib.sha256(text.encode()).hexdigest(), seed)
+
+
 class Notebook:
     """Trials on disk, written after each."""
 
-    def __init__(self, path: Path, identity: str) -> None:
+    def __init__(self, path: Path, identity: Identity) -> None:
         self._path, self._identity = path, identity
         self._trials: dict[str, Trial] = {}
         self.refused: dict[str, str] = {}
@@ -35,8 +57,8 @@ class Notebook:
             return
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
-            if data["identity"] != identity:
-                raise InputError(f"{path}: a study of another scene; give another folder with --out")
+            if Identity(data["scene"], data["seed"]) != identity:
+                raise InputError(f"{path}: a study of another scene or seed; give another folder with --out")
             trials = [Trial.from_dict(trial) for trial in data["trials"]]
             self.refused = dict(data["refused"])
         except (OSError, ValueError, KeyError, TypeError) as failure:
@@ -69,7 +91,8 @@ class Notebook:
 
     def _write(self, results: Mapping[str, Any] | None = None) -> None:
         data = {
-            "identity": self._identity,
+            "scene": self._identity.scene,
+            "seed": self._identity.seed,
             "library": _core.version(),
             "trials": [trial.to_dict() for trial in self._trials.values()],
             "refused": self.refused,

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from mirrorbake.study.trade.notebook import Identity
+
 NOUNS = {"bytes_per_degree": "bytes", "bake_s": "time to bake", "draw_ms": "time to draw"}
 """What the costs are called."""
 
@@ -70,21 +72,33 @@ class Stability:
         return found
 
 
-def read_study(folder: Path) -> Study:
+def read_study(folder: Path, identity: Identity) -> Study:
     """Return the study in a folder, as far as it has come.
+
+    Parameters
+    ----------
+    folder
+        Of the study.
+    identity
+        Of what it will be compared with.
 
     Raises
     ------
     InputError
-        There is none.
+        There is none, or it is one of another scene, or under the same seed.
     """
     path = folder / STUDY_NAME
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
+        scene, seed = data["scene"], data["seed"]
         trials = [Trial.from_dict(trial) for trial in data["trials"]]
         base = next(trial for trial in trials if not trial.settings)
     except (OSError, ValueError, KeyError, TypeError, StopIteration) as failure:
         raise InputError(f"{path}: expected a study: {failure or 'it has no trials'}") from None
+    if scene != identity.scene:
+        raise InputError(f"{path}: a study of another scene, or by another version")
+    if seed == identity.seed:
+        raise InputError(f"{path}: under seed {seed}, too; expected one under another seed (--seed)")
     return Study(base, [], [trial for trial in trials if trial.settings], len(trials))
 
 

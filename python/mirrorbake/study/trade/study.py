@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-import json
 import math
 import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, cast
 
-from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
 from mirrorbake.bake.map_sizes import SMALLEST_MAP
 from mirrorbake.errors import InputError, OptionError
-from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.stage import prepare_stage
 from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of, log_ratio
-from mirrorbake.study.trade.notebook import Measurements, Notebook, words_of
+from mirrorbake.study.trade.notebook import Identity, Measurements, Notebook, words_of
 from mirrorbake.study.trade.trial import Bench, Trial, overridden
 
 if TYPE_CHECKING:
@@ -147,7 +143,7 @@ def study(
     report(0, 1, "preparing the scene")
     folder.mkdir(parents=True, exist_ok=True)
     config = shrunk(config, longest_side)
-    notebook = Notebook(folder / STUDY_NAME, _identity(config))
+    notebook = Notebook(folder / STUDY_NAME, Identity.of(config))
     stage = _studied(config)
     chosen = _named(axes_of(stage), axes)
     singles = singles_of(chosen)
@@ -271,13 +267,6 @@ def _studied(config: SceneConfig) -> Stage:
         decided["layers.local"] = local.pop()
     stage = stage.in_parts(cast("Parts", plan.value("reflector.parts")))
     return replace(stage, config=overridden(config, decided))
-
-
-def _identity(config: SceneConfig) -> str:
-    """Changes with the scene, its files and the library: what a study may go on with."""
-    inputs = {key: {**value, "path": None} for key, value in hash_inputs(config).items()}
-    text = json.dumps([_core.version(), json.loads(config.model_dump_json()), inputs], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _of_labels(axes: Sequence[Axis], again: Sequence[Mapping[str, str]]) -> list[dict[str, Setting]]:

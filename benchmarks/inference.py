@@ -206,10 +206,15 @@ def step(
     solvers = [solver_of(matrix, problem, 1e-30, steps) for steps in (few, many)]
     times = [min(timed(partial(solve, solver)) for _ in range(4)) for solver in solvers]
     seen = len(np.unique(matrix.texels))
-    # An entry's number in its band of rows, 2 bytes, and its weight, 4; a row's count and weights; of an
-    # unknown vectors of 16 bytes, as often as a step reads or writes one at the least, and where its further
-    # shares begin. What several bands read is read and given back by each of them; that is not counted.
-    moved = 6 * matrix.nonzeros + (4 + 16) * matrix.rows + (12 * 16 + 4) * seen
+    # Of two entries beside each other a number, 2 bytes, and two weights, 8; a row's count and weights; of an
+    # unknown three floats, as often as a step reads or writes a vector at the least, and twice the
+    # preconditioner, of 2 bytes a channel. What several bands read is read and given back by each of
+    # them; that is not counted.
+    first = np.zeros(matrix.nonzeros, bool)
+    first[matrix.row_offsets[:-1]] = True
+    first[1:] |= np.diff(matrix.texels.astype(np.int64)) != 1
+    runs = np.diff(np.flatnonzero(np.append(first, True)))
+    moved = 10 * int(((runs + 1) // 2).sum()) + (4 + 16) * matrix.rows + (10 * 12 + 2 * 6) * seen
     return Case(
         case=f"a step, {problem.name}, {moved / 1e6:.0f} MB",
         unit="ms",

@@ -1,12 +1,16 @@
 #include "banded_rows.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
+#include <memory>
 #include <string>
 #include <utility>
 
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "row_kernels.hpp"
 
 namespace mirrorbake {
 namespace {
@@ -15,26 +19,8 @@ namespace {
 // cache; with fewer, more texels are read by two bands.
 constexpr std::size_t kBandEntries = std::size_t{1} << 15;
 constexpr std::size_t kNarrow = std::size_t{1} << 16;
-// Bands that are numbered one after the other, with one table of the texels.
+// Bands that are worked on one after the other, with one table of the texels.
 constexpr std::size_t kBandsPerTable = 16;
-
-template <typename Number>
-Channels read(const Number* numbers, const float* weights, std::size_t count, const Channels* x) {
-  // Two sums: one would wait for itself.
-  Channels even{}, odd{};
-  std::size_t e = 0;
-  for (; e + 1 < count; e += 2) {
-    even += broadcast(weights[e]) * x[numbers[e]];
-    odd += broadcast(weights[e + 1]) * x[numbers[e + 1]];
-  }
-  if (e < count) even += broadcast(weights[e]) * x[numbers[e]];
-  return even + odd;
-}
-
-template <typename Number>
-void give(const Number* numbers, const float* weights, std::size_t count, Channels t, Channels* y) {
-  for (std::size_t e = 0; e < count; ++e) y[numbers[e]] += broadcast(weights[e]) * t;
-}
 
 // What a thread copies a band's texels to, and where it makes its shares.
 struct Local {
@@ -97,7 +83,19 @@ bool sees_one(const std::vector<NodeWeight>& nodes) {
 
 }  // namespace
 
-BandedRows::BandedRows(std::span<const SolverView> views, std::span<const TexelTopology> maps)
+const SolverLoops& solver_loops() {
+#ifdef MIRRORBAKE_HAS_X86_LEVELS
+  switch (active_isa()) {
+    case Isa::avx512: return avx512::kSolverLoops;
+    case Isa::avx2: return avx2::kSolverLoops;
+    case Isa::sse42: return sse42::kSolverLoops;
+    case Isa::baseline: break;
+  }
+#endif
+  return baseline::kSolverLoops;
+}
+
+BandedRows::BandedRows(std::span<const SolverView> views, std::span<const TexelTopology> maps, int nodes)
     : first_place_{0} {
   for (const TexelTopology& map : maps) texels_per_node_ += map.texels();
   for (const SolverView& view : views) {
@@ -111,26 +109,14 @@ BandedRows::BandedRows(std::span<const SolverView> views, std::span<const TexelT
   for (std::size_t group = 0; group < groups_.size(); ++group) {
     const std::size_t first_row = order.size();
     for (const auto& [key, view, row] : sorted_rows(views, groups_[group], maps)) {
-      places_[first_place_[view] + row] = static_cast<std::uint32_t>(order.size());
-      order.push_back({views[view].matrix, row});
+      order.push_back({views[view].matrix, view, row});
     }
     cut(group, first_row, order);
   }
-  std::size_t narrow = 0, wide = 0;
-  for (Band& band : bands_) {
-    band.first_entry = narrow + wide;
-    band.wide = band.entries > kNarrow;
-    std::size_t& next = band.wide ? wide : narrow;
-    band.first_number = next;
-    next += band.entries;
-  }
-  narrow_.resize(narrow);
-  wide_.resize(wide);
-  weights_.resize(narrow + wide);
-  parallel_for(bands_.size(), kBandsPerTable, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint32_t> number_of(texels_per_node_, kNoTexel);
-    for (std::size_t b = begin; b < end; ++b) take_entries(bands_[b], order, number_of);
-  });
+  find_reads(order);
+  number(nodes);
+  pair_entries(order);
+  find_parts();
 }
 
 void BandedRows::cut(std::size_t group, std::size_t first_row, std::span<const RowOfView> order) {
@@ -145,152 +131,209 @@ void BandedRows::cut(std::size_t group, std::size_t first_row, std::span<const R
   }
 }
 
-void BandedRows::take_entries(Band& band, std::span<const RowOfView> order,
-                              std::vector<std::uint32_t>& number_of) {
-  std::size_t next = 0;
-  for (std::size_t r = band.begin; r < band.end; ++r) {
-    const RenderingMatrix& matrix = *order[r].matrix;
-    const std::size_t first = matrix.row_offsets[order[r].row];
-    counts_[r] = static_cast<std::uint32_t>(order[r].entries());
-    for (std::size_t e = first; e < first + counts_[r]; ++e, ++next) {
-      const std::uint32_t texel = matrix.texels[e];
-      if (number_of[texel] == kNoTexel) {
-        number_of[texel] = static_cast<std::uint32_t>(band.texels.size());
-        band.texels.push_back(texel);
+// A bit for each texel sorts them.
+void BandedRows::find_reads(std::span<const RowOfView> order) {
+  parallel_for(bands_.size(), kBandsPerTable, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint64_t> bits(texels_per_node_ / 64 + 1);
+    for (std::size_t b = begin; b < end; ++b) {
+      Band& band = bands_[b];
+      std::size_t lowest = bits.size(), highest = 0, count = 0;
+      for (const RowOfView& row : order.subspan(band.begin, band.end - band.begin)) {
+        for (const std::uint32_t texel : std::span(row.matrix->texels).subspan(row.first(), row.entries())) {
+          const std::size_t word = texel / 64;
+          const std::uint64_t bit = std::uint64_t{1} << (texel % 64);
+          count += (bits[word] & bit) == 0 ? 1 : 0;
+          bits[word] |= bit;
+          lowest = std::min(lowest, word);
+          highest = std::max(highest, word);
+        }
       }
-      if (band.wide) {
-        wide_[band.first_number + next] = number_of[texel];
-      } else {
-        narrow_[band.first_number + next] = static_cast<std::uint16_t>(number_of[texel]);
+      band.reads.reserve(count);
+      for (std::size_t word = lowest; word <= highest && word < bits.size(); ++word) {
+        for (std::uint64_t left = bits[word]; left != 0; left &= left - 1) {
+          band.reads.push_back(static_cast<std::uint32_t>(64 * word) +
+                               static_cast<std::uint32_t>(std::countr_zero(left)));
+        }
+        bits[word] = 0;
       }
-      weights_[band.first_entry + next] = matrix.weights[e];
     }
-  }
-  for (const std::uint32_t texel : band.texels) number_of[texel] = kNoTexel;
+  });
 }
 
-std::vector<std::uint32_t> BandedRows::number(int nodes) {
-  std::size_t reads = 0;
-  for (const Band& band : bands_) reads += band.texels.size() * seen_by(band).size();
-  if (reads >= std::numeric_limits<std::uint32_t>::max() / 2) {
-    throw InvalidArgument("views", std::to_string(reads) + " texels of bands of rows", "below 2^31");
+void BandedRows::number(int nodes) {
+  std::size_t most = 0;
+  for (const Band& band : bands_) most += band.reads.size() * (seen_by(band).size() + 1) + 1;
+  if (most >= std::numeric_limits<std::uint32_t>::max() / 2) {
+    throw InvalidArgument("views", std::to_string(most) + " texels of bands of rows", "below 2^31");
   }
   std::vector<std::uint32_t> number_of(texels_per_node_ * static_cast<std::size_t>(nodes), kNoTexel);
-  std::vector<std::uint32_t> numbered;
-  for (Band& band : bands_) number(band, number_of, numbered);
-  unknowns_ = numbered.size();
-  for_bands([&](const Band& band) {
-    // From the order in which rows meet them to first the own, then the others; `texels` holds the place.
-    const std::size_t end = band.first_number + band.entries;
-    for (std::size_t e = band.first_number; e < end; ++e) {
-      if (band.wide) {
-        wide_[e] = band.texels[wide_[e]];
-      } else {
-        narrow_[e] = static_cast<std::uint16_t>(band.texels[narrow_[e]]);
-      }
-    }
-  });
-  for (Band& band : bands_) band.texels = {};
-  find_parts();
-  return numbered;
+  for (Band& band : bands_) number(band, number_of);
 }
 
-void BandedRows::number(Band& band, std::vector<std::uint32_t>& number_of,
-                        std::vector<std::uint32_t>& numbered) {
+void BandedRows::number(Band& band, std::vector<std::uint32_t>& number_of) {
   const std::vector<NodeWeight>& seen = seen_by(band);
-  const auto numbered_now = [&](std::size_t texel) {
-    if (number_of[texel] == kNoTexel) {
-      number_of[texel] = static_cast<std::uint32_t>(numbered.size());
-      numbered.push_back(static_cast<std::uint32_t>(texel));
+  band.reads_own = sees_one(seen);
+  band.first = texels_.size();
+  for (const NodeWeight& node : seen) {
+    for (const std::uint32_t read : band.reads) {
+      const std::size_t texel = texels_per_node_ * static_cast<std::size_t>(node.node) + read;
+      if (number_of[texel] != kNoTexel) continue;
+      number_of[texel] = static_cast<std::uint32_t>(texels_.size());
+      texels_.push_back(static_cast<std::uint32_t>(texel));
     }
-    return number_of[texel];
-  };
-  band.first_own = numbered.size();
+  }
+  band.own = texels_.size() - band.first;
   band.first_other = others_;
   band.first_read = reads_.size();
-  std::vector<std::uint32_t> places;
-  places.reserve(band.texels.size());
-  constexpr std::uint32_t kOther = 0x80000000U;
-  for (const std::uint32_t texel : band.texels) {
-    const std::size_t first = texels_per_node_ * static_cast<std::size_t>(seen.front().node) + texel;
-    if (sees_one(seen_by(band)) && number_of[first] == kNoTexel) {
-      numbered_now(first);
-      places.push_back(static_cast<std::uint32_t>(band.own++));
-      continue;
-    }
+  for (const std::uint32_t read : band.reads) {
+    const std::size_t first = texels_per_node_ * static_cast<std::size_t>(seen.front().node) + read;
+    if (band.reads_own && number_of[first] >= band.first) continue;
     for (const NodeWeight& node : seen) {
-      reads_.push_back(numbered_now(texels_per_node_ * static_cast<std::size_t>(node.node) + texel));
+      reads_.push_back(number_of[texels_per_node_ * static_cast<std::size_t>(node.node) + read]);
     }
-    places.push_back(kOther | static_cast<std::uint32_t>(band.others++));
+    ++band.others;
   }
   others_ += band.others;
-  for (std::uint32_t& place : places) {
-    if ((place & kOther) != 0) place = static_cast<std::uint32_t>(band.own) + (place & ~kOther);
-  }
-  band.texels = std::move(places);
 }
 
-// Sorts the shares in what other bands own by unknown.
-void BandedRows::find_parts() {
-  first_part_.assign(unknowns_ + 2, 0);
-  for (const std::uint32_t unknown : reads_) ++first_part_[unknown + 2];
-  for (std::size_t i = 2; i < first_part_.size(); ++i) first_part_[i] += first_part_[i - 1];
-  parts_.resize(reads_.size());
-  for (const Band& band : bands_) {
-    const std::uint32_t* unknown = reads_.data() + band.first_read;
-    for (std::size_t i = 0; i < band.others; ++i) {
-      const auto share = static_cast<std::uint32_t>(unknowns_ + band.first_other + i);
-      for (const NodeWeight& node : seen_by(band)) {
-        parts_[first_part_[*unknown++ + 1]++] = {share, node.weight};
-      }
+void BandedRows::pair_entries(std::span<const RowOfView> order) {
+  parallel_for(bands_.size(), kBandsPerTable, [&](std::size_t begin, std::size_t end) {
+    // Whatever a band looks up in it, it has put there.
+    const auto number_of = std::make_unique_for_overwrite<std::uint32_t[]>(texels_per_node_);
+    for (std::size_t b = begin; b < end; ++b) {
+      number_reads(bands_[b], number_of.get());
+      pair_entries(bands_[b], order, number_of.get());
+      bands_[b].reads = {};
     }
-  }
-  first_part_.pop_back();
-}
-
-template <typename Body>
-void BandedRows::for_bands(const Body& body) const {
-  parallel_for(bands_.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) body(bands_[b]);
   });
 }
 
-template <typename Body>
-ChannelSums BandedRows::sum_over_bands(const Body& body) const {
-  std::vector<ChannelSums> of_bands(bands_.size());
-  for_bands(
-      [&](const Band& band) { of_bands[static_cast<std::size_t>(&band - bands_.data())] = body(band); });
-  ChannelSums sums{};
-  for (const ChannelSums& of_band : of_bands) add(sums, of_band);
-  return sums;
+void BandedRows::pair_entries(Band& band, std::span<const RowOfView> order, const std::uint32_t* number_of) {
+  // Rows of as many pairs follow each other, or a processor guesses wrong at the end of almost every one.
+  struct Counted {
+    std::uint32_t pairs;
+    std::size_t row;
+    auto operator<=>(const Counted&) const = default;
+  };
+  std::vector<Counted> rows;
+  rows.reserve(band.end - band.begin);
+  std::vector<std::uint32_t> numbers;
+  numbers.reserve(band.entries);
+  std::size_t pairs = 0;
+  for (std::size_t r = band.begin; r < band.end; ++r) {
+    const std::uint32_t* texels = order[r].matrix->texels.data() + order[r].first();
+    const std::size_t before = pairs;
+    std::uint32_t single = kNoTexel;  // the number that would make a pair of the last one
+    for (std::size_t e = 0; e < order[r].entries(); ++e) {
+      const std::uint32_t number = number_of[texels[e]];
+      numbers.push_back(number);
+      const bool second = number == single;
+      pairs += second ? 0 : 1;
+      single = second ? kNoTexel : number + 1;
+    }
+    rows.push_back({static_cast<std::uint32_t>(pairs - before), r});
+  }
+  std::vector<std::size_t> first_number(rows.size());
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    first_number[i] = first_number[i - 1] + order[rows[i - 1].row].entries();
+  }
+  std::ranges::sort(rows);
+
+  const bool wide = band.entries > kNarrow;
+  (wide ? band.wide.resize(pairs) : band.narrow.resize(pairs));
+  band.weights.resize(2 * pairs);
+  std::size_t pair = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const RowOfView& row = order[rows[i].row];
+    const std::uint32_t* number = numbers.data() + first_number[rows[i].row - band.begin];
+    const float* weight = row.matrix->weights.data() + row.first();
+    counts_[band.begin + i] = rows[i].pairs;
+    places_[first_place_[row.view] + row.row] = static_cast<std::uint32_t>(band.begin + i);
+    for (std::size_t e = 0; e < row.entries(); ++e, ++pair) {
+      if (wide) {
+        band.wide[pair] = number[e];
+      } else {
+        band.narrow[pair] = static_cast<std::uint16_t>(number[e]);
+      }
+      band.weights[2 * pair] = weight[e];
+      if (e + 1 < row.entries() && number[e + 1] == number[e] + 1) band.weights[2 * pair + 1] = weight[++e];
+    }
+  }
+}
+
+void BandedRows::number_reads(const Band& band, std::uint32_t* number_of) const {
+  const std::size_t node = texels_per_node_ * static_cast<std::size_t>(seen_by(band).front().node);
+  std::uint32_t own = 0, other = band.reads_own ? static_cast<std::uint32_t>(band.own) : 0;
+  for (const std::uint32_t read : band.reads) {
+    // Own unknowns are in the order of the reads.
+    const bool is_own = band.reads_own && own < band.own && texels_[band.first + own] == node + read;
+    number_of[read] = is_own ? own++ : other++;
+  }
+}
+
+// Sorts the shares in what other bands own by the owner.
+void BandedRows::find_parts() {
+  const auto owner_of = [&](std::uint32_t unknown, std::size_t likely) {
+    const Band& guess = bands_[likely];
+    if (unknown >= guess.first && unknown < guess.first + guess.own) return likely;
+    // Bands that own nothing begin where the next one does.
+    const auto after = std::ranges::upper_bound(bands_, std::size_t{unknown}, {}, &Band::first);
+    return static_cast<std::size_t>(after - bands_.begin()) - 1;
+  };
+  std::vector<std::uint32_t> owners(reads_.size());
+  for (std::size_t i = 0; i < reads_.size(); ++i) {
+    owners[i] = static_cast<std::uint32_t>(owner_of(reads_[i], i > 0 ? owners[i - 1] : 0));
+    ++bands_[owners[i]].end_part;
+  }
+  std::size_t next = 0;
+  for (Band& band : bands_) {
+    band.first_part = next;
+    next += band.end_part;
+    band.end_part = band.first_part;
+  }
+  parts_.resize(next);
+  for (const Band& band : bands_) {
+    std::size_t read = band.first_read;
+    for (std::size_t i = 0; i < band.others; ++i) {
+      const auto share = static_cast<std::uint32_t>(texels_.size() + band.first_other + i);
+      for (const NodeWeight& node : seen_by(band)) {
+        parts_[bands_[owners[read]].end_part++] = {reads_[read], share, node.weight};
+        ++read;
+      }
+    }
+  }
 }
 
 template <typename Row>
 void BandedRows::for_rows(const Band& band, const Row& row) const {
   const auto go = [&](const auto* numbers) {
-    const float* weights = weights_.data() + band.first_entry;
+    const float* weights = band.weights.data();
     for (std::size_t r = band.begin; r < band.end; ++r) {
       row(r, numbers, weights, std::size_t{counts_[r]});
       numbers += counts_[r];
-      weights += counts_[r];
+      weights += 2 * std::size_t{counts_[r]};
     }
   };
-  if (band.wide) {
-    go(wide_.data() + band.first_number);
+  if (band.wide.empty()) {
+    go(band.narrow.data());
   } else {
-    go(narrow_.data() + band.first_number);
+    go(band.wide.data());
   }
 }
 
-const Channels* BandedRows::collect(const Band& band, const Vector& x) const {
+const Channels* BandedRows::collect(const Band& band, const TexelVector& x) const {
   Vector& to = local().texels;
-  if (to.size() < band.own + band.others) to.resize(band.own + band.others);
-  std::copy_n(x.begin() + static_cast<std::ptrdiff_t>(band.first_own), band.own, to.begin());
+  const std::size_t own = band.reads_own ? band.own : 0;
+  // One more, which the last pair may begin before.
+  if (to.size() < own + band.others + 1) to.resize(own + band.others + 1);
+  to[own + band.others] = Channels{};
+  const SolverLoops& loops = solver_loops();
+  if (own > 0) loops.widen(own, x.stride(), x.at(band.first), floats(to.data()));
   const std::vector<NodeWeight>& seen = seen_by(band);
   const std::uint32_t* unknown = reads_.data() + band.first_read;
-  Channels* other = to.data() + band.own;
-  if (sees_one(seen_by(band))) {
-    for (std::size_t i = 0; i < band.others; ++i) other[i] = x[unknown[i]];
+  Channels* other = to.data() + own;
+  if (band.reads_own) {
+    loops.gather(band.others, x.stride(), x.data(), unknown, floats(other));
   } else {
     for (std::size_t i = 0; i < band.others; ++i) {
       Channels sum{};
@@ -302,77 +345,66 @@ const Channels* BandedRows::collect(const Band& band, const Vector& x) const {
 }
 
 Channels* BandedRows::clear(const Band& band) {
-  local().shares.assign(band.own + band.others, Channels{});
+  local().shares.assign(band.own + band.others + 1, Channels{});
   return local().shares.data();
 }
 
-void BandedRows::put(const Band& band, const Channels* made, Vector& shares) const {
-  std::copy_n(made, band.own, shares.begin() + static_cast<std::ptrdiff_t>(band.first_own));
-  std::copy_n(made + band.own, band.others,
-              shares.begin() + static_cast<std::ptrdiff_t>(unknowns_ + band.first_other));
+void BandedRows::put(const Band& band, const Channels* made, TexelVector& shares) const {
+  const SolverLoops& loops = solver_loops();
+  loops.narrow(band.own, shares.stride(), floats(made), shares.at(band.first));
+  loops.narrow(band.others, shares.stride(), floats(made + band.own),
+               shares.at(texels_.size() + band.first_other));
 }
 
-void BandedRows::multiply(const Vector& x, Vector& b) const {
+void BandedRows::add_parts(const Band& band, TexelVector& shares) const {
+  solver_loops().add(band.end_part - band.first_part, shares.stride(), parts_.data() + band.first_part,
+                     shares.data());
+}
+
+void BandedRows::multiply(const TexelVector& x, Vector& b) const {
   for_bands([&](const Band& band) {
     const Channels* texels = collect(band, x);
-    for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      b[r] = read(numbers, entries, count, texels);
+    for_rows(band, [&](std::size_t r, const auto* numbers, const float* weights, std::size_t pairs) {
+      Channels sum{};
+      for (std::size_t p = 0; p < pairs; ++p) {
+        sum += broadcast(weights[2 * p]) * texels[numbers[p]];
+        sum += broadcast(weights[2 * p + 1]) * texels[numbers[p] + 1U];
+      }
+      b[r] = sum;
     });
   });
 }
 
-ChannelSums BandedRows::residual(const Vector& weights, const Vector& target, const Vector& x,
-                                 Vector& shares) const {
-  return sum_over_bands([&](const Band& band) {
-    const Channels* texels = collect(band, x);
-    Channels* made = clear(band);
-    ChannelDoubles squares{};
-    for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      const Channels t = target[r] - read(numbers, entries, count, texels);
-      const Channels weighted = weights[r] * t;
-      add_product(squares, weighted, t);
-      give(numbers, entries, count, weighted, made);
-    });
-    put(band, made, shares);
-    return to_sums(squares);
-  });
+Channels* BandedRows::go_through(const Band& band, const Vector& weights, const Channels* target,
+                                 const TexelVector& x, ChannelSums& squares) const {
+  const Channels* texels = collect(band, x);
+  Channels* made = clear(band);
+  const PairedRows rows{band.end - band.begin, counts_.data() + band.begin,
+                        band.wide.empty() ? band.narrow.data() : nullptr, band.wide.data(),
+                        band.weights.data()};
+  solver_loops().rows(rows, floats(weights.data() + band.begin),
+                      target == nullptr ? nullptr : floats(target + band.begin), floats(texels),
+                      floats(numbered(band, made)), squares.data());
+  return made;
 }
 
-ChannelSums BandedRows::normal(const Vector& weights, const Vector& x, Vector& shares) const {
-  return sum_over_bands([&](const Band& band) {
-    const Channels* texels = collect(band, x);
-    Channels* made = clear(band);
-    ChannelDoubles squares{};
-    for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      const Channels t = read(numbers, entries, count, texels);
-      const Channels weighted = weights[r] * t;
-      add_product(squares, weighted, t);
-      give(numbers, entries, count, weighted, made);
-    });
-    put(band, made, shares);
-    return to_sums(squares);
-  });
-}
-
-void BandedRows::transposed(const Vector& weights, const Vector& t, Vector& shares) const {
+void BandedRows::diagonal(const Vector& weights, TexelVector& shares) const {
   for_bands([&](const Band& band) {
     Channels* made = clear(band);
-    for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      give(numbers, entries, count, weights[r] * t[r], made);
-    });
-    put(band, made, shares);
-  });
-}
-
-void BandedRows::diagonal(const Vector& weights, Vector& shares) const {
-  for_bands([&](const Band& band) {
-    Channels* made = clear(band);
-    for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t count) {
-      for (std::size_t e = 0; e < count; ++e) {
-        made[numbers[e]] += broadcast(entries[e] * entries[e]) * weights[r];
+    Channels* to = numbered(band, made);
+    for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t pairs) {
+      for (std::size_t p = 0; p < pairs; ++p) {
+        to[numbers[p]] += broadcast(entries[2 * p] * entries[2 * p]) * weights[r];
+        to[numbers[p] + 1U] += broadcast(entries[2 * p + 1] * entries[2 * p + 1]) * weights[r];
       }
     });
     put(band, made, shares);
+  });
+  for_bands([&](const Band& band) {
+    for (std::size_t i = band.first_part; i < band.end_part; ++i) {
+      const auto& [unknown, share, weight] = parts_[i];
+      shares.set(unknown, shares.alone(unknown) + broadcast(weight * weight) * shares[share]);
+    }
   });
 }
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -35,32 +37,39 @@ Channels to_channels(const ChannelSums& sums) {
   return c;
 }
 
-void clamp_to(const Bounds& bounds, Vector& x) {
+using Words = std::uint32_t __attribute__((vector_size(16)));
+using Halves = std::uint16_t __attribute__((vector_size(8)));
+using Flags = std::int32_t __attribute__((vector_size(16)));
+bool any(Flags flags) { return (flags[0] | flags[1] | flags[2] | flags[3]) != 0; }
+
+void clamp_to(const Bounds& bounds, TexelVector& x) {
   parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Channels lower = bounds.lower(i), upper = bounds.upper(i);
-      for (std::size_t k = 0; k < 4; ++k) x[i][k] = std::clamp(x[i][k], lower[k], upper[k]);
+      const Channels lower = bounds.lower(i), upper = bounds.upper(i), at = x.alone(i);
+      const Channels above = at < lower ? lower : at;
+      x.set(i, above > upper ? upper : above);
     }
   });
 }
 
-// Whether a channel of a texel lies on a bound from which half the negative gradient s does not lead inside.
-bool held(float x, float s, float lower, float upper) {
-  return (x <= lower && s <= 0.0F) || (x >= upper && s >= 0.0F);
+// Which channels of a texel lie on a bound from which half the negative gradient s does not lead inside.
+Flags held(Channels x, Channels s, Channels lower, Channels upper) {
+  return ((x <= lower) & (s <= Channels{})) | ((x >= upper) & (s >= Channels{}));
 }
 
 // Whether a round may go on: nothing has left its bounds, and nothing that is held on one wants inside.
-bool keeps(const Bounds& bounds, const Vector& x, const Vector& s, const Vector& inverse) {
+bool keeps(const Bounds& bounds, const TexelVector& x, const TexelVector& s,
+           const std::vector<InverseDiagonal>& inverse) {
   std::atomic<bool> kept{true};
+  const std::size_t stride = x.stride();
   parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end && kept.load(std::memory_order_relaxed); ++i) {
-      const Channels lower = bounds.lower(i), upper = bounds.upper(i);
-      for (std::size_t k = 0; k < 4; ++k) {
-        const bool left = x[i][k] < lower[k] || x[i][k] > upper[k];
-        const bool returns =
-            inverse[i][k] == 0.0F && s[i][k] != 0.0F && !held(x[i][k], s[i][k], lower[k], upper[k]);
-        if (left || returns) kept = false;
-      }
+      const Channels at = x[i], lower = bounds.lower(i), upper = bounds.upper(i);
+      Flags still{};
+      for (std::size_t k = 0; k < stride; ++k) still[k] = inverse[stride * i + k] == 0 ? -1 : 0;
+      const Flags left = (at < lower) | (at > upper);
+      const Flags returns = still & (s[i] != Channels{}) & ~held(at, s[i], lower, upper);
+      if (any(left | returns)) kept = false;
     }
   });
   return kept;
@@ -68,31 +77,37 @@ bool keeps(const Bounds& bounds, const Vector& x, const Vector& s, const Vector&
 
 }  // namespace
 
-LeastSquares::LeastSquares(const MapSolver::State& state, Vector row_weights)
+LeastSquares::LeastSquares(const MapSolver::State& state, Vector row_weights, int stride)
     : state_(state),
+      stride_(stride),
       weights_(std::move(row_weights)),
-      shares_(state.rows.shares()),
-      diagonal_(state.unknowns()) {
+      shares_(state.rows.shares(), stride),
+      diagonal_(state.rows.unknowns(), stride) {
   state.rows.diagonal(weights_, shares_);
-  parallel_for(diagonal_.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) diagonal_[i] = state.rows.sum_of_squares(shares_, i);
-  });
+  std::copy_n(shares_.data(), diagonal_.size() * diagonal_.stride(), diagonal_.data());
   row_scale_ = find_row_scale();
   scale_ = to_channels(row_scale_);
 }
 
-Vector LeastSquares::back_project(const Vector& target) {
-  const std::size_t n = state_.unknowns();
-  Vector x(n);
-  state_.rows.transposed(weights_, target, shares_);
-  parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) x[i] = state_.rows.sum(shares_, i);
-  });
-  state_.rows.transposed(weights_, Vector(target.size(), broadcast(1.0F)), shares_);
-  parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
+TexelVector LeastSquares::back_project(const Vector& target) {
+  const BandedRows& rows = state_.rows;
+  const TexelVector nothing = vector();
+  const auto transposed = [&](const Vector& t) {
+    TexelVector sums(rows.shares(), stride_);
+    rows.for_bands([&](const Band& band) {
+      ChannelSums squares{};
+      rows.put(band, rows.residual(band, weights_, t, nothing, squares), sums);
+    });
+    rows.for_bands([&](const Band& band) { rows.add_parts(band, sums); });
+    return sums;
+  };
+  const TexelVector wanted = transposed(target);
+  const TexelVector total = transposed(Vector(target.size(), broadcast(1.0F)));
+  TexelVector x = vector();
+  parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Channels total = state_.rows.sum(shares_, i);
-      for (std::size_t k = 0; k < 4; ++k) x[i][k] = total[k] > 0.0F ? x[i][k] / total[k] : 0.0F;
+      const Channels by = total[i];
+      x.set(i, by > Channels{} ? wanted[i] / by : Channels{});
     }
   });
   return x;
@@ -100,10 +115,14 @@ Vector LeastSquares::back_project(const Vector& target) {
 
 // Σ w (A 1)² over the unknowns.
 ChannelSums LeastSquares::find_row_scale() {
-  const std::size_t n = state_.unknowns();
-  ChannelSums sums =
-      state_.rows.residual(weights_, Vector(weights_.size()), Vector(n, broadcast(1.0F)), shares_);
-  for (double& sum : sums) sum /= static_cast<double>(std::max<std::size_t>(n, 1));
+  TexelVector ones = vector();
+  std::fill_n(ones.data(), ones.size() * ones.stride(), 1.0F);
+  ChannelSums sums = state_.rows.sum_over_bands([&](const Band& band) {
+    ChannelSums squares{};
+    state_.rows.normal(band, weights_, ones, squares);
+    return squares;
+  });
+  for (double& sum : sums) sum /= static_cast<double>(std::max<std::size_t>(state_.rows.unknowns(), 1));
   return sums;
 }
 
@@ -120,9 +139,9 @@ ChannelSums LeastSquares::find_row_scale() {
 // unbounded solution instead would be far from the best map: where the data leave a combination of texels
 // undetermined, large positive and negative ones cancel.
 SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const Bounds& bounds,
-                                   double tolerance, Vector& x) {
-  const std::size_t n = state_.unknowns();
-  Iterate it{Vector(n), Vector(n), Vector(n), {}};
+                                   double tolerance, TexelVector& x) {
+  Iterate it{vector(), vector(), {}, {}};
+  it.inverse.resize(x.size() * x.stride());
   evaluate(target, magnitude, it.step, it);
   begin_round(magnitude, nullptr, it.step, it);
   const ChannelSums start = it.gamma;
@@ -135,14 +154,14 @@ SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const 
   };
 
   SolveReport report;
-  report.unknowns = n;
+  report.unknowns = state_.rows.unknowns();
   report.row_scale = row_scale_;
   clamp_to(bounds, x);
   ChannelSums squares = evaluate(target, magnitude, x, it);
   double length = kFirstRound;
   double best = std::numeric_limits<double>::infinity();
   int best_at = 0;
-  Vector before;
+  TexelVector before;
   while (true) {
     begin_round(magnitude, &bounds, x, it);
     report.relative_gradient = relative_gradient();
@@ -175,93 +194,97 @@ SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const 
   return report;
 }
 
-ChannelSums LeastSquares::evaluate(const Vector& target, float magnitude, const Vector& x, Iterate& it) {
-  ChannelSums squares = state_.rows.residual(weights_, target, x, shares_);
-  data_squares_ = 0;
-  for (const double sum : squares) data_squares_ += sum;
+ChannelSums LeastSquares::evaluate(const Vector& target, float magnitude, const TexelVector& x, Iterate& it) {
+  const BandedRows& rows = state_.rows;
   state_.regulariser.prepare(x, scratch_);
-  const ChannelSums regular = parallel_channel_sums(x.size(), [&](std::size_t begin, std::size_t end) {
-    ChannelDoubles sums{};
-    for (std::size_t i = begin; i < end; ++i) {
-      const Channels g = regularised(i, magnitude, x);
-      add_product(sums, x[i], g);
-      it.s[i] = state_.rows.sum(shares_, i) - g;
-    }
-    return to_sums(sums);
+  std::vector<double> of_rows(rows.bands());
+  const ChannelSums squares = rows.sum_over_bands([&](const Band& band) {
+    ChannelSums sums{}, regular{};
+    Channels* made = rows.residual(band, weights_, target, x, sums);
+    for (const double sum : sums) of_rows[rows.number_of(band)] += sum;
+    regularise(band, -1.0F, magnitude, x, made, regular);
+    rows.put(band, made, shares_);
+    for (std::size_t k = 0; k < 4; ++k) sums[k] -= regular[k];
+    return sums;
   });
-  add(squares, regular);
+  data_squares_ = 0;
+  for (const double sum : of_rows) data_squares_ += sum;
+  rows.for_bands([&](const Band& band) {
+    rows.add_parts(band, shares_);
+    std::copy_n(shares_.at(band.first), band.own * x.stride(), it.s.at(band.first));
+  });
   return squares;
 }
 
-void LeastSquares::begin_round(float magnitude, const Bounds* bounds, const Vector& x, Iterate& it) {
+void LeastSquares::regularise(const Band& band, float sign, float magnitude, const TexelVector& x,
+                              Channels* made, ChannelSums& sums) const {
+  if (!(magnitude > 0.0F || state_.regulariser.acts())) return;
+  const Channels factor = broadcast(sign) * scale_;
+  add(sums, state_.regulariser.add(band.first, band.first + band.own, factor, factor * broadcast(magnitude),
+                                   x, scratch_, made));
+}
+
+void LeastSquares::begin_round(float magnitude, const Bounds* bounds, const TexelVector& x, Iterate& it) {
   it.gamma = parallel_channel_sums(x.size(), [&](std::size_t begin, std::size_t end) {
     ChannelDoubles sums{};
     for (std::size_t i = begin; i < end; ++i) {
+      const Channels s = it.s[i];
       Channels inverse = preconditioner(i, magnitude);
       if (bounds != nullptr) {
-        const Channels lower = bounds->lower(i), upper = bounds->upper(i);
-        for (std::size_t k = 0; k < 4; ++k) {
-          if (held(x[i][k], it.s[i][k], lower[k], upper[k])) inverse[k] = 0.0F;
-        }
+        inverse = held(x[i], s, bounds->lower(i), bounds->upper(i)) ? Channels{} : inverse;
       }
-      it.inverse[i] = inverse;
-      it.step[i] = inverse * it.s[i];
-      add_product(sums, it.s[i], it.step[i]);
+      // As the loops read it, rounded towards 0.
+      const Words bits = std::bit_cast<Words>(inverse) >> 16;
+      const auto halves = __builtin_convertvector(bits, Halves);
+      std::memcpy(&it.inverse[x.stride() * i], &halves, x.stride() == 4 ? 8 : 6);
+      const Channels step = std::bit_cast<Channels>(bits << 16) * s;
+      it.step.set(i, step);
+      add_product(sums, s, step);
     }
     return to_sums(sums);
   });
 }
 
-// One step of conjugate gradients. With three passes over the unknowns, none of which keeps the matrix's
-// product with the step: what length the step has is known from the rows before their shares are added up.
-void LeastSquares::step_once(float magnitude, Vector& x, Iterate& it) {
-  const std::size_t n = x.size();
-  const bool regular = magnitude > 0.0F || state_.regulariser.acts();
-  ChannelSums curvature = state_.rows.normal(weights_, it.step, shares_);
-  if (regular) {
-    it.regular.resize(n);
-    state_.regulariser.prepare(it.step, scratch_);
-    add(curvature, parallel_channel_sums(n, [&](std::size_t begin, std::size_t end) {
-          ChannelDoubles sums{};
-          for (std::size_t j = begin; j < end; ++j) {
-            it.regular[j] = regularised(j, magnitude, it.step);
-            add_product(sums, it.step[j], it.regular[j]);
-          }
-          return to_sums(sums);
-        }));
-  }
+// One step of conjugate gradients, in three passes. The first makes the bands' shares of the matrix's product
+// with the step, and what length the step has; that product is added up by the second, nowhere kept.
+void LeastSquares::step_once(float magnitude, TexelVector& x, Iterate& it) {
+  const BandedRows& rows = state_.rows;
+  const SolverLoops& loops = solver_loops();
+  const std::size_t stride = x.stride();
+  state_.regulariser.prepare(it.step, scratch_);
+  const ChannelSums curvature = rows.sum_over_bands([&](const Band& band) {
+    ChannelSums sums{};
+    Channels* made = rows.normal(band, weights_, it.step, sums);
+    regularise(band, 1.0F, magnitude, it.step, made, sums);
+    rows.put(band, made, shares_);
+    return sums;
+  });
   ChannelSums length{};
   for (std::size_t k = 0; k < 4; ++k) length[k] = curvature[k] > 0 ? it.gamma[k] / curvature[k] : 0;
   const Channels a = to_channels(length);
-  const ChannelSums next = parallel_channel_sums(n, [&](std::size_t begin, std::size_t end) {
-    ChannelDoubles sums{};
-    for (std::size_t j = begin; j < end; ++j) {
-      Channels normal = state_.rows.sum(shares_, j);
-      if (regular) normal += it.regular[j];
-      const Channels s = it.s[j] - a * normal;
-      it.s[j] = s;
-      add_product(sums, s, it.inverse[j] * s);
-    }
-    return to_sums(sums);
+  const ChannelSums next = rows.sum_over_bands([&](const Band& band) {
+    rows.add_parts(band, shares_);
+    ChannelSums sums{};
+    loops.gradient(band.own, stride, floats(&a), shares_.at(band.first),
+                   it.inverse.data() + stride * band.first, it.s.at(band.first), sums.data());
+    return sums;
   });
   ChannelSums ratio{};
   for (std::size_t k = 0; k < 4; ++k) ratio[k] = it.gamma[k] > 0 ? next[k] / it.gamma[k] : 0;
   it.gamma = next;
   const Channels b = to_channels(ratio);
-  parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t j = begin; j < end; ++j) {
-      const Channels step = it.step[j];
-      x[j] += a * step;
-      it.step[j] = it.inverse[j] * it.s[j] + b * step;
-    }
+  parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+    loops.step(end - begin, stride, floats(&a), floats(&b), it.inverse.data() + stride * begin,
+               it.s.at(begin), x.at(begin), it.step.at(begin));
   });
 }
 
 // Puts what a round made of `before` within the bounds, every channel as far along the round's step as does
 // not raise its sum of squares. Returns the sums.
 ChannelSums LeastSquares::project(const Vector& target, float magnitude, const Bounds& bounds,
-                                  const Vector& before, const ChannelSums& squares, Vector& x, Iterate& it) {
-  const Vector unbounded = x;
+                                  const TexelVector& before, const ChannelSums& squares, TexelVector& x,
+                                  Iterate& it) {
+  const TexelVector unbounded = x;
   Channels share = broadcast(1.0F);
   for (int tries = 0;; ++tries) {
     clamp_to(bounds, x);
@@ -275,7 +298,7 @@ ChannelSums LeastSquares::project(const Vector& target, float magnitude, const B
     }
     if (!shorter) return now;
     parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) x[i] = before[i] + share * (unbounded[i] - before[i]);
+      for (std::size_t i = begin; i < end; ++i) x.set(i, before[i] + share * (unbounded[i] - before[i]));
     });
   }
 }

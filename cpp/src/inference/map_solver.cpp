@@ -56,22 +56,20 @@ MapSolver::MapSolver(std::span<const SolverView> views, std::span<const TexelTop
       check_at_least("node weight", static_cast<double>(node.weight), 0.0);
     }
   }
-  BandedRows rows(views, maps);
-  std::vector<std::uint32_t> numbered = rows.number(nodes);
+  BandedRows rows(views, maps, nodes);
   std::vector<std::uint8_t> seen(all);
   std::vector<std::uint32_t> number_of(all, kNoTexel);
-  for (std::size_t i = 0; i < numbered.size(); ++i) {
-    seen[numbered[i]] = 1;
-    number_of[numbered[i]] = static_cast<std::uint32_t>(i);
+  for (std::size_t i = 0; i < rows.unknowns(); ++i) {
+    seen[rows.texels()[i]] = 1;
+    number_of[rows.texels()[i]] = static_cast<std::uint32_t>(i);
   }
-  Regulariser regulariser(maps, number_of, numbered.size(), options);
+  Regulariser regulariser(maps, number_of, rows.unknowns(), options);
   state_ = std::make_unique<State>(State{options,
                                          {maps.begin(), maps.end()},
                                          texels,
                                          nodes,
                                          std::move(rows),
                                          std::move(seen),
-                                         std::move(numbered),
                                          std::move(regulariser)});
 }
 
@@ -135,24 +133,26 @@ MapSolution MapSolver::solve(const SolveProblem& problem) const {
   const State& s = *state_;
   check(problem, s);
   const std::size_t c = static_cast<std::size_t>(problem.channels);
-  const std::size_t n = s.unknowns();
+  const std::size_t n = s.rows.unknowns();
+  const std::vector<std::uint32_t>& texels = s.rows.texels();
   Vector wanted = widen_rows(problem, &ViewTarget::target, s.rows);
   const Vector row_weights = widen_rows(problem, &ViewTarget::row_weights, s.rows);
-  LeastSquares system(s, row_weights);
+  const int stride = problem.channels == 4 ? 4 : 3;
+  LeastSquares system(s, row_weights, stride);
 
   // Of a map of all nodes, the texels that are seen.
   const auto seen_texels = [&](std::span<const float> map) {
-    Vector values(n);
+    TexelVector values(n, stride);
     if (map.empty()) return values;
     parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        for (std::size_t k = 0; k < c; ++k) values[i][k] = map[s.texels[i] * c + k];
+        std::copy_n(map.data() + texels[i] * c, c, values.at(i));
       }
     });
     return values;
   };
   // The unknown is the difference from the prior, which without one is zero.
-  const Vector base = seen_texels(problem.prior);
+  const TexelVector base = seen_texels(problem.prior);
   if (!problem.prior.empty()) {
     Vector rendered(wanted.size());
     s.rows.multiply(base, rendered);
@@ -163,12 +163,12 @@ MapSolution MapSolver::solve(const SolveProblem& problem) const {
   for (std::size_t k = 0; k < 4; ++k) largest[k] = problem.upper_bounds[k];
   const Bounds bounds{base, largest};
 
-  Vector x;
+  TexelVector x;
   if (problem.initial.empty()) {
     x = system.back_project(wanted);
   } else {
     x = seen_texels(problem.initial);
-    for (std::size_t i = 0; i < n; ++i) x[i] -= base[i];
+    for (std::size_t i = 0; i < n; ++i) x.set(i, x[i] - base[i]);
   }
 
   MapSolution solution;
@@ -179,7 +179,7 @@ MapSolution MapSolver::solve(const SolveProblem& problem) const {
   solution.report.rms_error = weight > 0 ? std::sqrt(system.data_squares() / weight) : 0.0;
 
   Vector difference(s.seen.size());
-  for (std::size_t i = 0; i < n; ++i) difference[s.texels[i]] = x[i];
+  for (std::size_t i = 0; i < n; ++i) difference[texels[i]] = x[i];
   const FillTowards towards = problem.prior.empty() ? FillTowards::neighbours : FillTowards::zero;
   for (std::size_t first = 0; problem.unseen == UnseenTexels::filled && first < difference.size();) {
     for (const TexelTopology& map : s.maps) {

@@ -13,7 +13,7 @@ namespace mirrorbake {
 
 /// The quadratic form λ_s Σ (x_i − x_j)² + λ_a Σ ω_q (x_q − mean of its children)² over numbered texels: i
 /// and j neighbours on one level, q a texel with children, ω_q a quarter of its numbered children. Terms that
-/// would involve texels without a number are left out.
+/// would involve texels without a number are left out. Numbers may be left out, too.
 class Regulariser {
  public:
   /// `number_of`: the number of every texel of all maps, in their order, that of all nodes one after the
@@ -24,27 +24,23 @@ class Regulariser {
   /// False if the form is 0.
   bool acts() const { return !links_.empty(); }
 
-  /// Makes `scratch` ready for `at` of the same x.
-  void prepare(const Vector& x, Vector& scratch) const;
+  /// Makes `scratch` ready for `add` of the same x.
+  void prepare(const TexelVector& x, Vector& scratch) const;
 
-  /// Entry i of G x.
-  Channels at(std::size_t i, const Vector& x, const Vector& scratch) const {
-    const Links& links = links_[i];
-    Channels difference{};
-    for (std::uint32_t neighbour : links.neighbours) difference += x[i] - x[neighbour];
-    const Channels disagreement = scratch[i] - broadcast(links.share) * scratch[links.parent];
-    return broadcast(options_.smoothness) * difference + broadcast(options_.level_agreement) * disagreement;
-  }
+  /// y_i += factor (G x)_i + near x_i for the numbers from `begin` to `end`, the first of which y begins
+  /// with. Returns what that adds to xᵀy.
+  ChannelSums add(std::size_t begin, std::size_t end, Channels factor, Channels near, const TexelVector& x,
+                  const Vector& scratch, Channels* y) const;
 
   /// Diagonal entry of G.
   float diagonal(std::size_t number) const { return diagonal_[number]; }
 
  private:
-  /// What is missing is the texel itself, which differs from itself by nothing.
+  /// A neighbour that is missing is the texel itself, which differs from itself by nothing.
   struct Links {
     std::array<std::uint32_t, 4> neighbours;
-    std::uint32_t parent;
-    float share = 0.0F;  // in the mean of the parent's children, those that have a number
+    std::uint32_t parent = 0;  // in parents_
+    float share = 0.0F;        // in the mean of the parent's children, those that have a number
   };
   /// A texel that has children, and how many of them have a number.
   struct Parent {
@@ -54,7 +50,7 @@ class Regulariser {
   };
   SolveOptions options_;
   std::vector<Links> links_;
-  std::vector<Parent> parents_;
+  std::vector<Parent> parents_;  // by their numbers
   std::vector<float> diagonal_;
 };
 

@@ -10,6 +10,7 @@
 
 #include "mirror_sphere.hpp"
 #include "mirrorbake/core/error.hpp"
+#include "mirrorbake/core/isa.hpp"
 #include "mirrorbake/core/parallel.hpp"
 
 namespace mirrorbake {
@@ -261,6 +262,22 @@ TEST(MapSolver, SameBitsOnOneThread) {
   const MapSolution one = solve(problem, {}, target, 3);
   EXPECT_EQ(all.texels, one.texels);
   EXPECT_EQ(all.report.iterations, one.report.iterations);
+}
+
+TEST(MapSolver, SameBitsOnEveryInstructionSet) {
+  const Problem problem = make_problem(64, 4, 32);
+  for (const int channels : {1, 3, 4}) {
+    const std::size_t values = static_cast<std::size_t>(channels) * problem.matrix.rows();
+    const std::vector<float> target = testing::random_values(values, 5);
+    const auto solved = [&](Isa isa) {
+      const IsaLimit limit(isa);
+      return solve(problem, {}, target, channels).texels;
+    };
+    const std::vector<float> expected = solved(Isa::baseline);
+    for (const Isa isa : {Isa::sse42, Isa::avx2, Isa::avx512}) {
+      EXPECT_EQ(solved(isa), expected) << to_string(isa) << ", " << channels << " channels";
+    }
+  }
 }
 
 TEST(MapSolver, FillsUnseenTexelsBetweenTheSeenOnes) {

@@ -52,8 +52,9 @@ def test_auto_is_a_value_of_every_key_that_is_decided_before_a_bake() -> None:
     ("data", "message"),
     [
         ({"maps": {"size": 100}}, "scene: maps.size = 100: should be a power of two"),
-        ({"maps": {"size": "large"}}, "scene: maps.size = 'large': should be a valid integer"),
-        ({"layers": {"local": "on"}}, "scene: layers.local = 'on': should be a valid boolean"),
+        ({"maps": {"size": "large"}}, "scene: maps.size = 'large': should be a valid integer, or 'auto'"),
+        ({"trace": {"noise": "low"}}, "scene: trace.noise = 'low': should be a valid number, or 'auto'"),
+        ({"layers": {"local": "on"}}, "scene: layers.local = 'on': should be a valid boolean, or 'auto'"),
         ({"trace": {"depth": 65}}, "scene: trace.depth = 65: should be less than or equal to 64"),
         ({"auto": {"tolerance": 1.0}}, "scene: auto.tolerance = 1.0: should be less than 1"),
         ({"maps": {"size": 0}}, "scene: maps.size = 0: should be greater than or equal to 1"),

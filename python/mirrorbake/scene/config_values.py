@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+)
 
 MAX_IMAGE_SIDE = 16384
 MAX_MAP_SIZE = 4096
@@ -27,15 +37,21 @@ def _power_of_two(value: int) -> int:
     return value
 
 
-def _none_for_auto(value: Any) -> Any:
-    return None if value == "auto" else value
+def _none_for_auto(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
+    try:
+        return validate(None if value == "auto" else value)
+    except ValidationError as failure:
+        if not isinstance(value, str):
+            raise
+        expected = failure.errors()[0]["msg"].removeprefix("Value error, ")
+        raise ValueError(f"{expected}, or 'auto'") from None
 
 
 def _auto_for_none(value: Any) -> Any:
     return "auto" if value is None else value
 
 
-AUTO = (BeforeValidator(_none_for_auto), PlainSerializer(_auto_for_none))
+AUTO = (WrapValidator(_none_for_auto), PlainSerializer(_auto_for_none))
 """Makes None of a file's "auto", and "auto" of None."""
 
 Vec3: TypeAlias = Annotated[tuple[float, float, float], BeforeValidator(as_tuple)]

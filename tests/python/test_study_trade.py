@@ -21,13 +21,14 @@ from mirrorbake.pem.pyramid import join_pyramid, split_pyramid
 from mirrorbake.projection import texel_directions
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import prepare_stage
+from mirrorbake.study.middle import overridden
 from mirrorbake.study.trade import maps, show
 from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of
 from mirrorbake.study.trade.drawing import FILTERS, Drawing, draw_samples
 from mirrorbake.study.trade.notebook import Identity
 from mirrorbake.study.trade.stability import combinations_of, compare, read_study
 from mirrorbake.study.trade.study import STUDY_NAME, Study, advice, shrunk, singles_of, study
-from mirrorbake.study.trade.trial import Bench, Trial, overridden
+from mirrorbake.study.trade.trial import Bench, Trial
 
 if TYPE_CHECKING:
     from pathlib import Path

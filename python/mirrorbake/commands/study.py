@@ -14,7 +14,7 @@ from typer.core import TyperGroup
 
 from mirrorbake import _core
 from mirrorbake.commands.errors import reports_errors
-from mirrorbake.commands.options import Assignments, Seed, Threads, scene_config
+from mirrorbake.commands.options import Assignments, EmSize, Seed, Size, Threads, scene_config
 from mirrorbake.commands.progress import messages, progress
 from mirrorbake.errors import OptionError
 
@@ -259,5 +259,61 @@ def inference_command(
             *decibels,
             f"{result.seconds:.1f}",
             "yes" if result.converged else "no",
+        )
+    Console(highlight=False, width=None if sys.stdout.isatty() else 140).print(table)
+
+
+@app.command("quality")
+@reports_errors
+def quality_command(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)],
+    qualities: Annotated[
+        str, typer.Option("--qualities", metavar="A,B,…", help="Some of draft, normal, high. [default: all]")
+    ] = "",
+    views: Annotated[
+        int, typer.Option("--views", min=1, metavar="N", help="At most, around the middle of the arc.")
+    ] = 5,
+    size: Size = None,
+    em_size: EmSize = None,
+    assignments: Assignments = None,
+    seed: Seed = None,
+    json: Json = False,
+    threads: Threads = 0,
+) -> None:
+    """Time, bytes, memory and decibels of a scene's few views in each quality."""
+    import tempfile
+
+    from mirrorbake.evaluate.places import PLACE_TITLES
+    from mirrorbake.evaluate.table import number
+    from mirrorbake.study import quality
+
+    config = scene_config(scene, assignments, None, size, None, em_size, seed)
+    names = [name.strip() for name in qualities.split(",") if name.strip()]
+    with tempfile.TemporaryDirectory() as folder, progress() as add_bar:
+        results = quality.study(
+            config, Path(folder), names, views=views, threads=threads, progress=add_bar("study")
+        )
+    if json:
+        typer.echo(json_module.dumps([result.to_dict() for result in results]))
+        return
+    places = [place for place in quality.PLACES if any(place in result.psnr for result in results)]
+    table = Table(
+        title="Processor time, all threads together; PSNR in dB on the object, as a display shows it",
+        title_justify="left",
+    )
+    table.add_column("quality", no_wrap=True)
+    costs = ("preparation s", "first view s", "further view s", "MB a sample", "peak GiB")
+    for title in (*costs, *(PLACE_TITLES[place] for place in places), "static set"):
+        table.add_column(title, justify="right")
+    for result in results:
+        table.add_row(
+            result.quality,
+            number(result.preparation_s, 1),
+            number(result.first_view_s, 1),
+            number(result.further_view_s, 1),
+            number(result.sample_bytes / 1e6, 2),
+            number(result.peak_bytes / 2**30, 2),
+            *(number(result.psnr.get(place), 1) for place in places),
+            number(result.static_set, 1),
         )
     Console(highlight=False, width=None if sys.stdout.isatty() else 140).print(table)

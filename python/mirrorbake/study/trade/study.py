@@ -12,9 +12,10 @@ from mirrorbake.bake.analyze import analyze
 from mirrorbake.bake.map_sizes import SMALLEST_MAP
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.scene.stage import prepare_stage
+from mirrorbake.study.middle import in_the_middle, overridden
 from mirrorbake.study.trade.axes import AXIS_NAMES, Axis, Setting, axes_of, log_ratio
 from mirrorbake.study.trade.notebook import Identity, Measurements, Notebook, words_of
-from mirrorbake.study.trade.trial import Bench, Trial, overridden
+from mirrorbake.study.trade.trial import Bench, Trial
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -244,16 +245,7 @@ def _studied(config: SceneConfig) -> Stage:
         raise InputError(f"views.kind = {views.kind!r}: a study needs views on an arc")
     if views.count is None:
         raise InputError('views.count = "auto": a study needs a number')
-    if views.count > 1:
-        step = views.degrees / (views.count - 1)
-        middle = views.start + step * ((views.count - 1) // 2)
-        overrides: dict[str, Any] = {
-            "views.count": STUDIED_VIEWS,
-            "views.start": middle - step * (STUDIED_VIEWS // 2),
-            "views.degrees": step * (STUDIED_VIEWS - 1),
-        }
-        config = overridden(config, overrides)
-    config = overridden(config, {"static.views": 0})
+    config = overridden(in_the_middle(config, STUDIED_VIEWS), {"static.views": 0})
     stage = prepare_stage(config)
     plan = analyze(stage)
     decided = {

@@ -20,8 +20,8 @@ from mirrorbake.pem.pyramid import coarse_end, pyramid_of, size_of
 from mirrorbake.pem.run_time import RunTime
 from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.build import build_scene
-from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import Stage, prepare_stage
+from mirrorbake.study.middle import overridden
 from mirrorbake.study.trade.drawing import Drawing, draw, draw_samples
 from mirrorbake.study.trade.kept_traces import KeptTraces
 from mirrorbake.study.trade.maps import packed_bytes
@@ -75,21 +75,6 @@ class Trial:
     def from_dict(data: Mapping[str, Any]) -> Trial:
         """Inverse of `to_dict`. Raises TypeError for what is not one."""
         return Trial(**data)
-
-
-def overridden(config: SceneConfig, overrides: Mapping[str, Any]) -> SceneConfig:
-    """Return a scene with other values of some keys, such as `maps.size`.
-
-    Raises
-    ------
-    InputError
-        A value is out of range.
-    """
-    data: dict[str, Any] = json.loads(config.model_dump_json())
-    for key, value in overrides.items():
-        section, name = key.split(".")
-        data[section][name] = value
-    return parse_config(data, "study")
 
 
 class Bench:

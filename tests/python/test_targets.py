@@ -9,32 +9,40 @@ import numpy as np
 import pytest
 
 from mirrorbake.bake.bake import bake
-from mirrorbake.bake.targets import ViewTracer, bounds, pieces
+from mirrorbake.bake.targets import BAND_ROWS, ViewTracer, bounds, pieces
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.scene.load import parse_config
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mirrorbake.bake.targets import Window
-
 
 @pytest.mark.parametrize(
-    "inner", [(12, 22, 3, 4), (10, 20, 8, 6), (10, 20, 1, 1), (17, 25, 1, 1), (11, 20, 6, 6), None]
+    "seen",
+    [
+        [(12, 22), (14, 25)],
+        [(10, 20)],
+        [(17, 59)],
+        # Wide above, narrow below, and nothing for a while between them.
+        [(10, 21), (17, 22), (13, 58)],
+        [(x, y) for x in range(10, 18) for y in range(20, 60)],
+        [],
+    ],
 )
-def test_pieces_cover_a_window_once(inner: Window | None) -> None:
-    window = (10, 20, 8, 6)
-    times = np.zeros((40, 40), int)
-    for (left, top, width, height), is_inner in pieces(window, inner):
-        times[top : top + height, left : left + width] += 1
-        if is_inner and inner is not None:
-            # With the pixels around it, where the window has them.
-            assert left == max(inner[0] - 1, 10)
-            assert top == max(inner[1] - 1, 20)
-            assert left + width == min(inner[0] + inner[2] + 1, 18)
-            assert top + height == min(inner[1] + inner[3] + 1, 26)
-    assert times[20:26, 10:18].all()
-    assert times.sum() == 48
+def test_pieces_cover_a_window_once_and_hold_what_is_near_pixels(seen: list[tuple[int, int]]) -> None:
+    window = (10, 20, 8, 40)
+    pixel = np.array([(y - 20) * 8 + x - 10 for x, y in seen], int)
+    times, held = np.zeros((80, 40), int), np.zeros((80, 40), bool)
+    for (left, top, width, height), holds in pieces(window, pixel):
+        place = np.s_[top : top + height, left : left + width]
+        times[place] += 1
+        held[place] = holds
+    assert (times[20:60, 10:18] == 1).all()
+    assert times.sum() == 8 * 40
+    for x, y in seen:
+        assert held[max(y - 1, 20) : min(y + 2, 60), max(x - 1, 10) : min(x + 2, 18)].all()
+    if len(seen) < 4:
+        assert held.sum() <= len(seen) * (BAND_ROWS + 4) * 8
 
 
 def test_bounds_are_those_of_pixels_in_a_window() -> None:
@@ -64,7 +72,7 @@ def test_a_draft_saves_samples_off_the_object_alone(tmp_path: Path) -> None:
     assert np.array_equal(few.object, all_.object)
     inside = all_.coverage > 0.5
     assert np.array_equal(few.background[inside], all_.background[inside])
-    # Four samples for 64 leave noise, and no more: the same light in the mean.
+    # Two samples for 64 leave noise, and no more: the same light in the mean.
     off = np.ones(inside.shape, bool)
     left, top, width, height = bounds(np.flatnonzero(all_.coverage), (0, 0, 60, 44)) or (0, 0, 0, 0)
     off[max(top - 2, 0) : top + height + 2, max(left - 2, 0) : left + width + 2] = False

@@ -30,11 +30,11 @@ class Quality:
     static: int
     """Views of the static set."""
     background: int | None = None
-    """Samples of a pixel off the object's bounds, which no map is fitted to; None: as on the object."""
+    """Samples of a pixel off the object, which no map is fitted to; None: as on the object."""
 
 
 QUALITIES: Mapping[str, Quality] = {
-    "draft": Quality(noise=0.0, passes=1, neighbours=0.0, around=0, traced=0, static=0, background=4),
+    "draft": Quality(noise=0.0, passes=1, neighbours=0.0, around=0, traced=0, static=0, background=2),
     "normal": Quality(noise=0.01, passes=2, neighbours=0.3, around=8, traced=1, static=64),
     "high": Quality(noise=0.005, passes=2, neighbours=0.3, around=16, traced=2, static=128),
 }

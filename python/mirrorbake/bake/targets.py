@@ -31,6 +31,9 @@ BATCH = 1 << 22
 """Samples that are held at a time, were the object to fill the frame."""
 KEPT_BYTES = 1 << 30
 """Memory for views that later samples may need again."""
+BAND_ROWS = 16
+"""Each band of them has bounds of its own around the object: fewer follow its outline more closely, and leave
+less to do at a time."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ def few_samples(stage: Stage, most: int | None = None) -> Stage:
 
 
 def background_samples(stage: Stage) -> int | None:
-    """Per pixel off the object's bounds, by `auto.quality`; None: as many as on the object."""
+    """Per pixel off the object, by `auto.quality`; None: as many as on the object."""
     return QUALITIES[stage.config.auto.quality].background
 
 
@@ -86,29 +89,43 @@ def widened(inner: Window, margin: int, window: Window) -> Window:
     return (x0, y0, x1 - x0, y1 - y0)
 
 
-def pieces(window: Window, inner: Window | None) -> Iterator[tuple[Window, bool]]:
-    """Cut a window into rectangles, and tell which is the inner one, with a pixel around it.
+def pieces(window: Window, pixel: NDArray[np.integer]) -> Iterator[tuple[Window, bool]]:
+    """Cut a window into rectangles, and tell which hold pixels, or others next to them.
 
     Parameters
     ----------
-    window, inner
-        The inner one within the window; None: the window is all there is.
+    window
+        The whole.
+    pixel
+        Numbers of pixels, row by row within the window.
     """
-    if inner is None:
-        yield window, True
-        return
     left, top, width, height = window
-    x0, y0, across, down = widened(inner, 1, window)
-    x1, y1 = x0 + across, y0 + down
-    for rectangle, is_inner in (
-        ((left, top, width, y0 - top), False),
-        ((left, y0, x0 - left, y1 - y0), False),
-        ((x0, y0, x1 - x0, y1 - y0), True),
-        ((x1, y0, left + width - x1, y1 - y0), False),
-        ((left, y1, width, top + height - y1), False),
-    ):
-        if rectangle[2] > 0 and rectangle[3] > 0:
-            yield rectangle, is_inner
+    inner = bounds(pixel, window)
+    if inner is None:
+        yield window, False
+        return
+    _, y0, _, down = widened(inner, 1, window)
+    yield from _unless_empty((left, top, width, y0 - top), False)
+    rows = pixel // width
+    for y in range(y0, y0 + down, BAND_ROWS):
+        across = min(BAND_ROWS, y0 + down - y)
+        near = pixel[(rows + top >= y - 1) & (rows + top <= y + across)]
+        band = (left, y, width, across)
+        held = bounds(near, window)
+        if held is None:
+            yield band, False
+            continue
+        x0, _, wide, _ = widened(held, 1, window)
+        yield from _unless_empty((left, y, x0 - left, across), False)
+        yield (x0, y, wide, across), True
+        yield from _unless_empty((x0 + wide, y, left + width - x0 - wide, across), False)
+    end = y0 + down
+    yield from _unless_empty((left, end, width, top + height - end), False)
+
+
+def _unless_empty(rectangle: Window, holds: bool) -> Iterator[tuple[Window, bool]]:
+    if rectangle[2] > 0 and rectangle[3] > 0:
+        yield rectangle, holds
 
 
 class ViewTracer:
@@ -187,8 +204,8 @@ class ViewTracer:
         )
         background = background_samples(stage)
         elsewhere = stage if background is None else few_samples(stage, background)
-        object_at = None if background is None else bounds(np.asarray(lookups.pixel), window)
-        for rectangle, on_object in pieces(window, object_at):
+        cut = [(window, True)] if background is None else pieces(window, np.asarray(lookups.pixel))
+        for rectangle, on_object in cut:
             for band, traced in self._bands(stage if on_object else elsewhere, camera, rectangle):
                 x, y = band[0] - left, band[1] - top
                 targets.add(traced.samples, x, y)

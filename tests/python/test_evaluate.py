@@ -460,6 +460,13 @@ def test_the_table_shows_means_by_place_and_leaves_out_what_does_not_exist() -> 
     assert text.index("run time web ") < text.index("run time reference ")
 
 
+def test_the_run_time_that_maps_were_inferred_for_comes_first() -> None:
+    for own in ("web", "web1", "reference"):
+        first, *_, last = metrics_tables(Evaluation([made_up("on", 30.0)], {"run_time": own}))
+        assert str(first.title).endswith(f"run time {own}")
+        assert next(iter(last.columns[1].cells)) == own
+
+
 def test_what_is_infinite_is_null_in_json() -> None:
     figures = json.loads(Evaluation([made_up("on", math.inf, math.inf)], {}).to_json())
     assert figures["views"][0]["psnr"]["pem"]["reference"] is None

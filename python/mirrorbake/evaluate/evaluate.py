@@ -290,6 +290,7 @@ def evaluate(
             "library": source.library,
             "display_transform": DISPLAY_TRANSFORM,
             "mask": "pixels that the object covers wholly",
+            "run_time": main_run_time(pem),
             "config": source.config,
             "plan": pem.store.header.plan.to_dict(),
             "inputs": source.inputs,

@@ -42,10 +42,15 @@ def present(evaluation: Evaluation) -> list[str]:
 
 
 def metrics_tables(evaluation: Evaluation) -> list[Table]:
-    """Return the tables of an evaluation: PSNR of every contender by place, and all metrics of the PEM."""
+    """Return the tables of an evaluation: PSNR of every contender by place, and all metrics of the PEM.
+
+    The run time that the maps were inferred for comes first.
+    """
     names = present(evaluation)
     tables = []
-    for run_time in RUN_TIMES:
+    own = evaluation.header.get("run_time")
+    run_times = sorted(RUN_TIMES, key=lambda name: name != own)
+    for run_time in run_times:
         table = Table(
             title=f"PSNR in dB on the object, as a display shows it; run time {run_time}",
             title_justify="left",
@@ -70,7 +75,7 @@ def metrics_tables(evaluation: Evaluation) -> list[Table]:
     for title in METRIC_TITLES.values():
         table.add_column(title, justify="right")
     for place in evaluation.places:
-        for run_time in RUN_TIMES:
+        for run_time in run_times:
             values = (
                 number(evaluation.mean("pem", place, run_time=run_time, metric=metric), METRIC_DIGITS[metric])
                 for metric in METRIC_TITLES

@@ -72,15 +72,15 @@ class Stability:
         return found
 
 
-def read_study(folder: Path, identity: Identity) -> Study:
+def read_study(folder: Path, against: Identity | None = None) -> Study:
     """Return the study in a folder, as far as it has come.
 
     Parameters
     ----------
     folder
         Of the study.
-    identity
-        Of what it will be compared with.
+    against
+        What it will be compared with, if anything.
 
     Raises
     ------
@@ -95,9 +95,9 @@ def read_study(folder: Path, identity: Identity) -> Study:
         base = next(trial for trial in trials if not trial.settings)
     except (OSError, ValueError, KeyError, TypeError, StopIteration) as failure:
         raise InputError(f"{path}: expected a study: {failure or 'it has no trials'}") from None
-    if scene != identity.scene:
+    if against is not None and scene != against.scene:
         raise InputError(f"{path}: a study of another scene, or by another version")
-    if seed == identity.seed:
+    if against is not None and seed == against.seed:
         raise InputError(f"{path}: under seed {seed}, too; expected one under another seed (--seed)")
     return Study(base, [], [trial for trial in trials if trial.settings], len(trials))
 

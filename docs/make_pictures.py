@@ -38,8 +38,9 @@ def side(label: str, color: str) -> NDArray[np.float32]:
     canvas = FigureCanvasAgg(figure)
     figure.text(0.5, 0.5, label, ha="center", va="center", fontsize=22, weight="bold")
     figure.text(0.5, 0.84, "↑", ha="center", va="center", fontsize=14)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3].astype(np.float32) / 255
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+    return pixels[..., :3].astype(np.float32) / np.float32(255)
 
 
 def labelled_panorama(height: int) -> EnvMap:

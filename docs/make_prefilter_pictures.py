@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mirrorbake import save_image
@@ -141,7 +140,7 @@ def hardware_pictures() -> None:
     axes.set_ylabel("distortion, %")
     axes.legend()
     figure.tight_layout()
-    FigureCanvasAgg(figure).print_png(FOLDER / "parabolic_distortion.png")
+    figure.savefig(FOLDER / "parabolic_distortion.png")
     source = light_room().resample("latlong", 128)
     inside, _, reflected = ball(160)
     exact = Prefilter(source)
@@ -200,7 +199,7 @@ def mip_pictures() -> None:
         axes.set_xlabel("bias b, of a cube of 64²")
         axes.legend()
     figure.tight_layout()
-    FigureCanvasAgg(figure).print_png(FOLDER / "bias_curve.png")
+    figure.savefig(FOLDER / "bias_curve.png")
 
 
 def view_pictures() -> None:
@@ -225,7 +224,7 @@ def view_pictures() -> None:
     axes.set_ylim(20, 60)  # at the direction itself nothing is lost
     axes.legend()
     figure.tight_layout()
-    FigureCanvasAgg(figure).print_png(FOLDER / "view_curve.png")
+    figure.savefig(FOLDER / "view_curve.png")
 
 
 def background_pictures() -> None:
@@ -242,7 +241,7 @@ def background_pictures() -> None:
     dome = background(source, fisheye(160), rotation([1, 0, 0], 50))
     row = [*(part for picture in pictures for part in (picture, gap)), dome]
     whole = np.concatenate(row, axis=1)
-    save_image(str(FOLDER / "backgrounds.png"), whole / (1 + 0.35 * whole))
+    save_image(str(FOLDER / "backgrounds.png"), (whole / (1 + 0.35 * whole)).astype(np.float32))
 
 
 def warp_picture() -> None:
@@ -264,7 +263,7 @@ def warp_picture() -> None:
         (by_normal[:, :2], np.clip(by_normal[:, 2:] / 0.2, 0, 1)),
         (by_mirror, 1.0),
     ):
-        lines = (np.abs(np.mod(at * 5, 1) - 0.5) > 0.43).any(axis=-1)[:, None]
+        lines = np.any(np.abs(np.mod(at * 5, 1) - 0.5) > 0.43, axis=-1, keepdims=True)
         colour = np.where(lines, 0.05, 0.5 + 0.5 * np.concatenate([at, -at[:, :1]], axis=-1))
         pictures.append((faded * colour + (1 - faded) * 0.5).astype(np.float32))
     save_row("warps.png", inside, pictures)

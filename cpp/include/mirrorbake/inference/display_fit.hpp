@@ -88,9 +88,8 @@ struct DisplayFit {
 /// shells in front by the α of the layers' own fit; target: the traced pixel less its diffuse light; weight:
 /// coverage times the squared derivative of the display's curve (sRGB) at the model's own image, since at a
 /// noisy target it would prefer what came out dark. A target over white asks no more than white of an image
-/// below it. Beside them, weighted by μ, the rows of every layer by itself, of the views whose
-/// `layers` say so. `prior`: empty, or nodes × texels
-/// × 3.
+/// below it. Beside them, weighted by μ, the rows of every layer by itself, of the views whose `layers` say
+/// so. `prior`: empty, or nodes × texels × 3.
 ///
 /// F enters per channel: a row's weights follow the mean of its channels, each channel's scale its own, which
 /// is exact where F has one hue within a pixel.

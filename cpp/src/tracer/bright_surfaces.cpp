@@ -7,6 +7,7 @@
 
 #include "cdf.hpp"
 #include "gather.hpp"
+#include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
 #include "world.hpp"
 
@@ -61,6 +62,7 @@ BrightSurfaces::BrightSurfaces(const World& world, std::uint64_t seed) {
   }
   std::vector<double> areas(all.size()), powers(all.size());
   parallel_for(all.size(), 256, [&](std::size_t begin, std::size_t end) {
+    poll_interrupt();
     for (std::size_t i = begin; i < end; ++i) {
       const auto [object, triangle] = all[i];
       areas[i] = area_of(world, object, triangle);

@@ -240,7 +240,11 @@ void BandedRows::pair_entries(Band& band, std::span<const RowOfView> order, cons
   std::ranges::sort(rows);
 
   const bool wide = band.entries > kNarrow;
-  (wide ? band.wide.resize(pairs) : band.narrow.resize(pairs));
+  if (wide) {
+    band.wide.resize(pairs);
+  } else {
+    band.narrow.resize(pairs);
+  }
   band.weights.resize(2 * pairs);
   std::size_t pair = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {

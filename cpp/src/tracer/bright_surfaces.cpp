@@ -1,11 +1,11 @@
 #include "bright_surfaces.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
-#include <glm/geometric.hpp>
+#include <numeric>
+#include <utility>
+#include <glm/vec3.hpp>
 
-#include "cdf.hpp"
 #include "gather.hpp"
 #include "mirrorbake/core/interrupt.hpp"
 #include "mirrorbake/core/parallel.hpp"
@@ -32,9 +32,8 @@ double reflected(const World& world, std::uint64_t seed, std::uint32_t object, s
     double sum = 0.0;
     for (std::uint32_t i = 0; i < looks; ++i) {
       const SampleStream stream = sample_stream(hash64(seed, object), triangle, i);
-      glm::vec2 w = stream.get(diffuse_dimension);
-      if (w.x + w.y > 1.0F) w = 1.0F - w;
-      const Surface surface = surface_of_triangle(world, object, triangle, w, side * normal);
+      const glm::vec2 weights = uniform_on_triangle(stream.get(diffuse_dimension));
+      const Surface surface = surface_of_triangle(world, object, triangle, weights, side * normal);
       if (surface.albedo == glm::vec3(0.0F)) continue;
       const glm::vec3 irradiance = direct_irradiance(world, surface, stream.get(light_dimension), false);
       sum += static_cast<double>(luminance(surface.albedo * irradiance)) * std::numbers::inv_pi_v<double>;
@@ -44,19 +43,13 @@ double reflected(const World& world, std::uint64_t seed, std::uint32_t object, s
   return brightest;
 }
 
-double area_of(const World& world, std::uint32_t object, std::uint32_t triangle) {
-  const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(object));
-  const glm::uvec3 t = world.scene.objects[object].mesh.triangles[triangle];
-  const glm::dvec3 a(p[t.x]), b(p[t.y]), c(p[t.z]);
-  return 0.5 * glm::length(glm::cross(b - a, c - a));
-}
-
 }  // namespace
 
 BrightSurfaces::BrightSurfaces(const World& world, std::uint64_t seed) {
   const std::vector<Object>& objects = world.scene.objects;
-  std::vector<Triangle> all;
+  std::vector<TriangleSampler::Triangle> all;
   for (std::uint32_t o = 0; o < objects.size(); ++o) {
+    if ((objects[o].visibility & Visibility::reflection) == Visibility::none) continue;
     const auto count = static_cast<std::uint32_t>(objects[o].mesh.triangles.size());
     for (std::uint32_t t = 0; t < count; ++t) all.push_back({o, t});
   }
@@ -65,44 +58,30 @@ BrightSurfaces::BrightSurfaces(const World& world, std::uint64_t seed) {
     poll_interrupt();
     for (std::size_t i = begin; i < end; ++i) {
       const auto [object, triangle] = all[i];
-      areas[i] = area_of(world, object, triangle);
+      areas[i] = triangle_area(world.rays.positions(static_cast<int>(object)),
+                               objects[object].mesh.triangles[triangle]);
       if (areas[i] > 0.0) powers[i] = areas[i] * reflected(world, seed, object, triangle);
     }
   });
-  double area = 0.0, power = 0.0;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    area += areas[i];
-    power += powers[i];
-  }
-  std::vector<double> bright, bright_areas;
-  double bright_power = 0.0;
+  const double area = std::accumulate(areas.begin(), areas.end(), 0.0);
+  const double power = std::accumulate(powers.begin(), powers.end(), 0.0);
+  std::vector<TriangleSampler::Triangle> bright;
+  std::vector<double> bright_areas, bright_powers;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!(powers[i] * area > kBright * power * areas[i])) continue;
-    triangles_.push_back(all[i]);
-    bright.push_back(powers[i]);
+    bright.push_back(all[i]);
     bright_areas.push_back(areas[i]);
-    bright_power += powers[i];
+    bright_powers.push_back(powers[i]);
   }
-  if (!(bright_power > kLeastShare * power)) triangles_.clear();
-  if (triangles_.empty()) return;
-  cdf_.resize(bright.size() + 1);
-  normalise_cdf(cdf_.data(), bright.data(), static_cast<int>(bright.size()));
+  if (!(std::accumulate(bright_powers.begin(), bright_powers.end(), 0.0) > kLeastShare * power)) return;
+  points_ = TriangleSampler(std::move(bright), bright_powers);
   density_.resize(objects.size());
-  for (std::size_t i = 0; i < triangles_.size(); ++i) {
-    const auto [object, triangle] = triangles_[i];
+  for (std::size_t i = 0; i < bright_areas.size(); ++i) {
+    const auto [object, triangle] = points_.triangles()[i];
     std::vector<float>& density = density_[object];
     density.resize(objects[object].mesh.triangles.size());
-    // Of the intervals as they were rounded.
-    const double share = static_cast<double>(cdf_[i + 1]) - static_cast<double>(cdf_[i]);
-    density[triangle] = static_cast<float>(share / bright_areas[i]);
+    density[triangle] = static_cast<float>(points_.probability(i) / bright_areas[i]);
   }
-}
-
-BrightSurfaces::Point BrightSurfaces::sample(glm::vec2 u) const {
-  const CdfSample chosen = sample_cdf(cdf_.data(), static_cast<int>(triangles_.size()), u.x);
-  const auto [object, triangle] = triangles_[static_cast<std::size_t>(chosen.index)];
-  const float root = std::sqrt(chosen.place);
-  return {object, triangle, {root * (1.0F - u.y), root * u.y}};
 }
 
 }  // namespace mirrorbake::tracing

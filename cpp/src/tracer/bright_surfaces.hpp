@@ -5,7 +5,7 @@
 #include <glm/vec2.hpp>
 
 #include "ray_scene.hpp"
-#include "surface.hpp"
+#include "triangle_sampler.hpp"
 
 namespace mirrorbake::tracing {
 
@@ -21,16 +21,10 @@ class BrightSurfaces {
   /// Looks at all diffuse surfaces under direct light.
   BrightSurfaces(const World& world, std::uint64_t seed);
 
-  bool empty() const { return triangles_.empty(); }
+  bool empty() const { return points_.triangles().empty(); }
 
-  /// Point of a triangle.
-  struct Point {
-    std::uint32_t object = 0;
-    std::uint32_t triangle = 0;
-    glm::vec2 barycentric{0.0F};  ///< weights of the second and third vertex
-  };
-  /// With the density `density` of the triangle. `u` in [0,1)². Not to be called of an empty set.
-  Point sample(glm::vec2 u) const;
+  /// A random point, as if a ray had hit it. `u` in [0,1)². Not to be called of an empty set.
+  Hit sample(glm::vec2 u) const { return points_.sample(u); }
   /// Of points, m⁻²; 0 where a surface is not bright.
   float density(std::uint32_t object, std::uint32_t triangle) const {
     const std::vector<float>& of_object = density_[object];
@@ -38,11 +32,7 @@ class BrightSurfaces {
   }
 
  private:
-  struct Triangle {
-    std::uint32_t object, triangle;
-  };
-  std::vector<Triangle> triangles_;
-  std::vector<float> cdf_;                   ///< their number + 1, in [0,1]
+  TriangleSampler points_;
   std::vector<std::vector<float>> density_;  ///< per object and triangle; empty for an object without any
 };
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <span>
+#include <utility>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -12,6 +13,7 @@
 #include "cdf.hpp"
 #include "integrator.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "triangle_sampler.hpp"
 #include "world.hpp"
 
 namespace mirrorbake::tracing {
@@ -69,64 +71,29 @@ std::uint64_t square_bit(int bin) {
   return std::uint64_t{1} << (bin / kSide / kSquare * 8 + bin % kSide / kSquare);
 }
 
-}  // namespace
-
-// The specular surfaces as one distribution of triangles by area.
-class SpecularTriangles {
- public:
-  explicit SpecularTriangles(const World& world) {
-    std::vector<double> areas;
-    for (std::uint32_t o = 0; o < world.scene.objects.size(); ++o) {
-      const Object& object = world.scene.objects[o];
-      const bool is_seen = (object.visibility & Visibility::reflection) != Visibility::none;
-      if (!is_seen || !is_specular(world.scene, object)) continue;
-      const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(o));
-      for (std::uint32_t t = 0; t < object.mesh.triangles.size(); ++t) {
-        if (!world.scene.materials[static_cast<std::size_t>(material_of(object, t))].specular) continue;
-        const glm::uvec3 c = object.mesh.triangles[t];
-        const glm::dvec3 a = p[c.x];
-        areas.push_back(0.5 * glm::length(glm::cross(glm::dvec3(p[c.y]) - a, glm::dvec3(p[c.z]) - a)));
-        triangles_.push_back({o, t});
-      }
+// All specular surfaces that reflections show, by area.
+TriangleSampler specular_surfaces(const World& world) {
+  std::vector<TriangleSampler::Triangle> triangles;
+  std::vector<double> areas;
+  for (std::uint32_t o = 0; o < world.scene.objects.size(); ++o) {
+    const Object& object = world.scene.objects[o];
+    const bool is_seen = (object.visibility & Visibility::reflection) != Visibility::none;
+    if (!is_seen || !is_specular(world.scene, object)) continue;
+    const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(o));
+    for (std::uint32_t t = 0; t < object.mesh.triangles.size(); ++t) {
+      if (!world.scene.materials[static_cast<std::size_t>(material_of(object, t))].specular) continue;
+      areas.push_back(triangle_area(p, object.mesh.triangles[t]));
+      triangles.push_back({o, t});
     }
-    if (triangles_.empty()) return;
-    cdf_.resize(areas.size() + 1);
-    area_ = normalise_cdf(cdf_.data(), areas.data(), static_cast<int>(areas.size()));
   }
-
-  double area() const { return area_; }
-
-  /// A random point, as if a ray had hit it.
-  Hit sample(glm::vec2 u) const {
-    const CdfSample pick = sample_cdf(cdf_.data(), static_cast<int>(triangles_.size()), u.x);
-    const Triangle& t = triangles_[static_cast<std::size_t>(pick.index)];
-    const float root = std::sqrt(pick.place);
-    return {0.0F, t.object, t.triangle, root * (1.0F - u.y), root * u.y};
-  }
-
- private:
-  struct Triangle {
-    std::uint32_t object;
-    std::uint32_t triangle;
-  };
-  std::vector<Triangle> triangles_;
-  std::vector<float> cdf_;
-  double area_ = 0.0;
-};
-
-namespace {
-
-glm::vec3 point_at(const World& world, const Hit& hit) {
-  const glm::uvec3 c = world.scene.objects[hit.geometry].mesh.triangles[hit.triangle];
-  const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(hit.geometry));
-  return interpolate(p, c, {hit.u, hit.v});
+  return {std::move(triangles), areas};
 }
 
 }  // namespace
 
 void CausticGuide::shoot_one(const World& world, const Hit& start, float area, const SampleStream& stream,
                              Photons& photons) {
-  const std::optional<LightSample> light = world.lights.sample(point_at(world, start), stream.get(1), false);
+  const std::optional<LightSample> light = world.lights.sample(world.position(start), stream.get(1), false);
   if (!light) return;
   Surface surface = surface_at(world.scene, world.rays, start, -light->direction);
   // A mirror's image of a point light is found by no ray.
@@ -153,10 +120,10 @@ void CausticGuide::shoot_one(const World& world, const Hit& start, float area, c
   }
 }
 
-CausticGuide::Photons CausticGuide::shoot(const World& world, const SpecularTriangles& specular,
+CausticGuide::Photons CausticGuide::shoot(const World& world, const TriangleSampler& specular,
                                           std::uint64_t seed) {
   constexpr std::size_t kChunk = 4096;
-  const auto area = static_cast<float>(specular.area() / kPhotons);
+  const auto area = static_cast<float>(specular.weight() / kPhotons);
   std::vector<Photons> chunks((kPhotons + kChunk - 1) / kChunk);
   parallel_for(kPhotons, kChunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -257,12 +224,12 @@ void CausticGuide::fill(const std::vector<Photon>& photons, double irradiance_of
 }
 
 CausticGuide::CausticGuide(const World& world, std::uint64_t seed) {
-  const SpecularTriangles specular(world);
-  if (!(specular.area() > 0.0) || world.lights.empty()) return;
+  const TriangleSampler specular = specular_surfaces(world);
+  if (!(specular.weight() > 0.0) || world.lights.empty()) return;
   const Photons photons = shoot(world, specular, seed);
   if (photons.landed.empty()) return;
   lay_grid(photons.landed);
-  if (size_.x > 0) fill(photons.landed, photons.received / specular.area());
+  if (size_.x > 0) fill(photons.landed, photons.received / specular.weight());
 }
 
 glm::vec3 CausticGuide::sample(Cell cell, glm::vec2 u) const {

@@ -12,7 +12,7 @@
 namespace mirrorbake::tracing {
 
 struct World;
-class SpecularTriangles;
+class TriangleSampler;
 
 /// Where to look for caustics: from which directions light arrives at a place by way of specular surfaces. A
 /// diffuse path finds such light by chance alone, seldom and brightly; the guide tells where rays of their
@@ -76,7 +76,7 @@ class CausticGuide {
     double received = 0.0;  ///< power that falls on the specular surfaces, luminance, W
   };
 
-  static Photons shoot(const World& world, const SpecularTriangles& specular, std::uint64_t seed);
+  static Photons shoot(const World& world, const TriangleSampler& specular, std::uint64_t seed);
   /// From a point of a specular surface that stands for `area`.
   static void shoot_one(const World& world, const Hit& start, float area, const SampleStream& stream,
                         Photons& photons);

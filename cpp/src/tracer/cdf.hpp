@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 /// Sampling of tabulated distributions.
 namespace mirrorbake::tracing {
@@ -35,6 +36,11 @@ inline double normalise_cdf(float* cdf, const double* values, int count) {
   }
   cdf[count] = 1.0F;
   return sum;
+}
+
+/// Probability of an interval as it was rounded.
+inline double interval_width(const float* cdf, std::size_t index) {
+  return static_cast<double>(cdf[index + 1]) - static_cast<double>(cdf[index]);
 }
 
 }  // namespace mirrorbake::tracing

@@ -32,18 +32,6 @@ constexpr float kLeastShare = 0.2F;
 constexpr int kLeastRays = 8;
 constexpr int kLeastLaterRays = 4;
 
-// How many rays per solid angle go towards a hit: of `rays` along the cosine, and of `bright_rays` to bright
-// surfaces.
-float mean_rays(const World& world, const BrightSurfaces& bright, const Ray& ray, const Hit& hit,
-                float cosine, int rays, int bright_rays) {
-  const float along_cosine = static_cast<float>(rays) * cosine * std::numbers::inv_pi_v<float>;
-  const float density = bright.density(hit.geometry, hit.triangle);
-  if (density == 0.0F) return along_cosine;
-  const float there = std::abs(glm::dot(world.geometric_normal(ray, hit), ray.direction));
-  return along_cosine +
-         static_cast<float>(bright_rays) * density * hit.distance * hit.distance / std::max(there, 1e-6F);
-}
-
 }  // namespace
 
 IrradianceCache::IrradianceCache() = default;
@@ -62,102 +50,100 @@ IrradianceCache::IrradianceCache(const World& world, const CausticGuide& guide, 
   gather(world, guide, options);
 }
 
-std::array<Surface, IrradianceCache::kStartPoints> IrradianceCache::start_points(const World& world,
-                                                                                 std::size_t node, int side,
-                                                                                 std::uint32_t count) const {
+IrradianceCache::NodeRays IrradianceCache::node_rays(const World& world, std::size_t node, int side,
+                                                     int most) const {
+  NodeRays rays;
+  rays.key = hash64(seed_, 2 * node + static_cast<std::size_t>(side));
+  rays.is_back = side == 1;
+  // A node with a share of the rays is given up as early in them as others are.
+  rays.probing = rays_of(node, kProbeRays, kLeastRays);
   const std::span<const CacheCells::Corner> corners = cells_.corners(node);
-  std::array<Surface, kStartPoints> starts;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const SampleStream stream = sample_stream(seed_, side_number(node, side), i);
+  const std::size_t count = std::min<std::size_t>(kStartPoints, static_cast<std::size_t>(most));
+  for (std::size_t i = 0; i < count; ++i) {
     const CacheCells::Corner& corner = corners[i % corners.size()];
     const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
-    starts[i] = cells_.surface_near(world, corner, stream.get(dimension_base(0, 1)), side == 0 ? n : -n);
+    const glm::vec2 u = rays.stream(static_cast<int>(i)).get(dimension_base(0, 1));
+    rays.starts[i] = cells_.surface_near(world, corner, u, rays.is_back ? -n : n);
   }
-  return starts;
+  return rays;
 }
 
-glm::vec3 IrradianceCache::node_caustics(const World& world, const CausticGuide& guide, std::size_t node,
-                                         int side, int rays) const {
+glm::vec3 IrradianceCache::node_caustics(const World& world, const CausticGuide& guide, const NodeRays& rays,
+                                         int count) {
   if (guide.knows_nothing()) return glm::vec3(0.0F);
-  const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
-  const std::array<Surface, kStartPoints> starts = start_points(world, node, side, start_count);
   glm::vec3 sum(0.0F);
-  for (int r = 0; r < rays; ++r) {
-    const auto index = static_cast<std::uint32_t>(r);
-    sum += caustic_irradiance(world, guide, starts[index % start_count],
-                              sample_stream(seed_, side_number(node, side), index));
+  for (int r = 0; r < count; ++r) {
+    sum += caustic_irradiance(world, guide, rays.start(r, count), rays.stream(r));
   }
-  return sum / static_cast<float>(rays);
+  return sum / static_cast<float>(count);
 }
 
-glm::vec3 IrradianceCache::from_bright(const World& world, const BrightSurfaces& bright, std::size_t node,
-                                       int side, int rays, int bright_rays) const {
-  const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(bright_rays));
-  const std::array<Surface, kStartPoints> starts = start_points(world, node, side, start_count);
+// How many of a node's rays go towards a hit, per solid angle.
+float IrradianceCache::mean_rays(const World& world, const BrightSurfaces& bright, const NodeRays& rays,
+                                 const Ray& ray, const Hit& hit, float cosine) {
+  const float along_cosine = static_cast<float>(rays.along_cosine) * cosine * std::numbers::inv_pi_v<float>;
+  const float density = bright.density(hit.geometry, hit.triangle);
+  if (density == 0.0F) return along_cosine;
+  const float there = std::abs(glm::dot(world.geometric_normal(ray, hit), ray.direction));
+  return along_cosine +
+         static_cast<float>(rays.to_bright) * density * hit.distance * hit.distance / std::max(there, 1e-6F);
+}
+
+glm::vec3 IrradianceCache::from_bright(const World& world, const BrightSurfaces& bright,
+                                       const NodeRays& rays) {
   glm::vec3 sum(0.0F);
-  for (int r = 0; r < bright_rays; ++r) {
-    const auto index = static_cast<std::uint32_t>(r);
-    const SampleStream stream = sample_stream(seed_, side_number(node, side), index);
-    const Surface& start = starts[index % start_count];
-    const BrightSurfaces::Point point = bright.sample(stream.get(dimension_base(0, 1) + guide_dimension));
-    const glm::vec3 position =
-        surface_of_triangle(world, point.object, point.triangle, point.barycentric, start.normal).position;
-    const glm::vec3 direction = glm::normalize(position - start.position);
+  for (int r = 0; r < rays.to_bright; ++r) {
+    const SampleStream stream = rays.stream(r);
+    const Surface& start = rays.start(r, rays.to_bright);
+    const Hit wanted = bright.sample(stream.get(dimension_base(0, 1) + guide_dimension));
+    const glm::vec3 direction = glm::normalize(world.position(wanted) - start.position);
     const float cosine = glm::dot(start.normal, direction);
     if (!(cosine > 0.0F && glm::dot(start.geometric_normal, direction) > 0.0F)) continue;
     const Ray ray{offset_origin(start, direction), direction};
     const Hit hit = world.rays.all().intersect(ray, RayKind::reflection);
-    if (hit.geometry != point.object || hit.triangle != point.triangle) continue;
+    if (hit.geometry != wanted.geometry || hit.triangle != wanted.triangle) continue;
     const Surface surface = surface_at(world.scene, world.rays, hit, direction);
     const glm::vec2 u = stream.get(dimension_base(0, 1) + light_dimension);
     const glm::vec3 radiance =
         surface.albedo * std::numbers::inv_pi_v<float> * direct_irradiance(world, surface, u, false);
-    sum += radiance * cosine / mean_rays(world, bright, ray, hit, cosine, rays, bright_rays);
+    sum += radiance * cosine / mean_rays(world, bright, rays, ray, hit, cosine);
   }
   return sum;
 }
 
 template <typename IrradianceAt>
-IrradianceCache::NodeGather IrradianceCache::gather_node(const World& world, std::size_t node, int side,
-                                                         int rays, const BrightSurfaces& bright,
-                                                         int bright_rays,
-                                                         const IrradianceAt& irradiance_at) const {
-  const std::uint64_t number = side_number(node, side);
-  const auto start_count = std::min(kStartPoints, static_cast<std::uint32_t>(rays));
-  const std::array<Surface, kStartPoints> starts = start_points(world, node, side, start_count);
-
+IrradianceCache::NodeGather IrradianceCache::gather_node(const World& world, const BrightSurfaces& bright,
+                                                         const NodeRays& rays,
+                                                         const IrradianceAt& irradiance_at) {
   NodeGather result;
   int traced = 0;
   int dark = 0;
   int nothing = 0;
-  // A node with a share of the rays is given up as early in them as others are.
-  const int probe_rays = rays_of(node, kProbeRays, kLeastRays);
-  for (int r = 0; r < rays; ++r) {
-    const bool hopeless = dark == traced || (side == 1 && dark + nothing == traced);
-    if (r == probe_rays && hopeless) {
+  for (int r = 0; r < rays.along_cosine; ++r) {
+    const bool hopeless = dark == traced || (rays.is_back && dark + nothing == traced);
+    if (r == rays.probing && hopeless) {
       result.given_up = true;
       break;
     }
-    const auto index = static_cast<std::uint32_t>(r);
-    const SampleStream stream = sample_stream(seed_, number, index);
-    const Surface& start = starts[index % start_count];
+    const SampleStream stream = rays.stream(r);
+    const Surface& start = rays.start(r, rays.along_cosine);
     const glm::vec3 direction =
         sample_cosine_hemisphere(Frame(start.normal), stream.get(dimension_base(0, 0) + diffuse_dimension));
     if (!(glm::dot(direction, start.geometric_normal) > 0.0F)) continue;
     const Ray ray{offset_origin(start, direction), direction};
     const Gathered gathered = gather_along(world, ray, stream, irradiance_at);
-    float share = 1.0F;
-    if (bright_rays > 0 && gathered.first.geometry < world.scene.objects.size()) {
+    glm::vec3 first = gathered.radiance - gathered.by_mirrors;
+    if (rays.to_bright > 0 && first != glm::vec3(0.0F)) {
       const float cosine = glm::dot(start.normal, direction);
-      share = static_cast<float>(rays) * cosine * std::numbers::inv_pi_v<float> /
-              mean_rays(world, bright, ray, gathered.first, cosine, rays, bright_rays);
+      first *= static_cast<float>(rays.along_cosine) * cosine * std::numbers::inv_pi_v<float> /
+               mean_rays(world, bright, rays, ray, gathered.first, cosine);
     }
-    result.irradiance += share * (gathered.radiance - gathered.by_mirrors) + gathered.by_mirrors;
+    result.irradiance += first + gathered.by_mirrors;
     dark += gathered.dark_back_side ? 1 : 0;
     nothing += gathered.nothing ? 1 : 0;
     ++traced;
   }
-  result.irradiance *= std::numbers::pi_v<float> / static_cast<float>(rays);
+  result.irradiance *= std::numbers::pi_v<float> / static_cast<float>(rays.along_cosine);
   result.buried = 2 * dark > traced;
   return result;
 }
@@ -188,17 +174,19 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
           if (given_up[side][node] != 0) continue;
           poll_interrupt();
           const int own = rays_of(node, rays, pass == 0 ? kLeastRays : kLeastLaterRays);
-          const int to_bright = pass > 0 || bright.empty() ? 0 : std::max(own / kBrightShare, 1);
-          const NodeGather gathered = pass == 0
-                                          ? gather_node(world, node, side, own, bright, to_bright, direct)
-                                          : gather_node(world, node, side, own, bright, to_bright, indirect);
+          NodeRays of_node = node_rays(world, node, side, pass == 0 ? kCausticShare * own : own);
+          of_node.along_cosine = own;
+          if (pass > 0) {
+            found.side[side][node] = gather_node(world, bright, of_node, indirect).irradiance;
+            continue;
+          }
+          if (!bright.empty()) of_node.to_bright = std::max(own / kBrightShare, 1);
+          const NodeGather gathered = gather_node(world, bright, of_node, direct);
           found.side[side][node] = gathered.irradiance;
-          if (pass > 0) continue;
-          // Their bounce is gathered by the next pass.
+          // The bounce of what these find is gathered by the next pass.
           if (!gathered.given_up) {
-            if (to_bright > 0)
-              found.side[side][node] += from_bright(world, bright, node, side, own, to_bright);
-            found.side[side][node] += node_caustics(world, guide, node, side, kCausticShare * own);
+            found.side[side][node] += from_bright(world, bright, of_node);
+            found.side[side][node] += node_caustics(world, guide, of_node, kCausticShare * own);
           }
           buried[side][node] = gathered.buried ? 1 : 0;
           given_up[side][node] = gathered.given_up ? 1 : 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -7,6 +8,7 @@
 
 #include "cache_cells.hpp"
 #include "mirrorbake/tracer/tracer.hpp"
+#include "sample_stream.hpp"
 #include "surface.hpp"
 
 namespace mirrorbake::tracing {
@@ -49,9 +51,6 @@ class IrradianceCache {
     std::vector<glm::vec3> side[2];
   };
 
-  static std::uint64_t side_number(std::size_t node, int side) {
-    return 2 * node + static_cast<std::size_t>(side);
-  }
   glm::vec3 interpolate(const Sides& values, const Surface& surface) const {
     return cells_.interpolate(values.side[surface.front ? 0 : 1], surface);
   }
@@ -61,19 +60,33 @@ class IrradianceCache {
     bool buried = false;    ///< most rays hit the dark inside of a body
     bool given_up = false;  ///< the first rays found that, or, on a back side, nothing at all
   };
-  /// What bright surfaces reflect is weighted for a partner that takes `bright_rays` rays to them.
+  /// The rays of one side of a node.
+  struct NodeRays {
+    std::uint64_t key = 0;                     ///< of their random numbers
+    std::array<Surface, kStartPoints> starts;  ///< random points around it
+    bool is_back = false;
+    int along_cosine = 0;
+    int probing = 0;    ///< of those, after which a hemisphere may be given up
+    int to_bright = 0;  ///< beside those; 0: those find what bright surfaces reflect
+
+    SampleStream stream(int ray) const { return {key, static_cast<std::uint32_t>(ray)}; }
+    /// Where a ray of `count` starts.
+    const Surface& start(int ray, int count) const {
+      return starts[static_cast<std::uint32_t>(ray) %
+                    std::min(kStartPoints, static_cast<std::uint32_t>(count))];
+    }
+  };
+  /// With starts for at most `most` rays of a kind.
+  NodeRays node_rays(const World& world, std::size_t node, int side, int most) const;
   template <typename IrradianceAt>
-  NodeGather gather_node(const World& world, std::size_t node, int side, int rays,
-                         const BrightSurfaces& bright, int bright_rays,
-                         const IrradianceAt& irradiance_at) const;
-  /// That partner: irradiance by `bright_rays` rays to bright surfaces beside `rays` along the cosine.
-  glm::vec3 from_bright(const World& world, const BrightSurfaces& bright, std::size_t node, int side,
-                        int rays, int bright_rays) const;
-  /// Random points around a node, seen from one side; `count` ≤ kStartPoints.
-  std::array<Surface, kStartPoints> start_points(const World& world, std::size_t node, int side,
-                                                 std::uint32_t count) const;
-  glm::vec3 node_caustics(const World& world, const CausticGuide& guide, std::size_t node, int side,
-                          int rays) const;
+  static NodeGather gather_node(const World& world, const BrightSurfaces& bright, const NodeRays& rays,
+                                const IrradianceAt& irradiance_at);
+  static float mean_rays(const World& world, const BrightSurfaces& bright, const NodeRays& rays,
+                         const Ray& ray, const Hit& hit, float cosine);
+  /// What the rays to bright surfaces find; those along the cosine have the rest of it.
+  static glm::vec3 from_bright(const World& world, const BrightSurfaces& bright, const NodeRays& rays);
+  static glm::vec3 node_caustics(const World& world, const CausticGuide& guide, const NodeRays& rays,
+                                 int count);
   /// Adds up caustics and what the passes bring.
   void gather(const World& world, const CausticGuide& guide, const TracerOptions& options);
   /// Those after the last one that is followed: each keeps of the one before what the last one kept.

@@ -11,6 +11,7 @@
 #include "mirrorbake/core/parallel.hpp"
 #include "sample_stream.hpp"
 #include "surface.hpp"
+#include "triangle_sampler.hpp"
 
 namespace mirrorbake::tracing {
 namespace {
@@ -237,10 +238,7 @@ void Lights::add_mesh(std::size_t i) {
   for (std::size_t k = 0; k < object.mesh.triangles.size(); ++k) {
     const auto found = std::find(materials.begin(), materials.end(), material_of(object, k));
     const glm::vec3 emission = emissions[static_cast<std::size_t>(found - materials.begin())];
-    const glm::uvec3& t = object.mesh.triangles[k];
-    const glm::dvec3 a = object.mesh.positions[t.x];
-    const double of_one = 0.5 * glm::length(glm::cross(glm::dvec3(object.mesh.positions[t.y]) - a,
-                                                       glm::dvec3(object.mesh.positions[t.z]) - a));
+    const double of_one = triangle_area(object.mesh.positions, object.mesh.triangles[k]);
     if (!emits(emission) || !(of_one > 0.0)) continue;
     mesh.triangles.push_back(static_cast<std::uint32_t>(k));
     areas.push_back(of_one);
@@ -266,9 +264,7 @@ void Lights::add_mesh(std::size_t i) {
   mesh.area = static_cast<float>(area);
   mesh.density.assign(object.mesh.triangles.size(), 0.0F);
   for (std::size_t n = 0; n < areas.size(); ++n) {
-    // Of the intervals as they were rounded.
-    const double share = static_cast<double>(mesh.cdf[n + 1]) - static_cast<double>(mesh.cdf[n]);
-    mesh.density[mesh.triangles[n]] = static_cast<float>(share / areas[n]);
+    mesh.density[mesh.triangles[n]] = static_cast<float>(interval_width(mesh.cdf.data(), n) / areas[n]);
   }
   mesh.is_reflected = (object.visibility & Visibility::reflection) != Visibility::none;
   const Bounds& bounds = rays_->object_bounds(static_cast<int>(i));
@@ -347,8 +343,7 @@ std::optional<LightSample> Lights::sample_mesh(int object, glm::vec3 position, g
   const std::uint32_t triangle = mesh.triangles[static_cast<std::size_t>(t.index)];
   const glm::uvec3 corner = source.triangles[triangle];
   const std::span<const glm::vec3> p = rays_->positions(object);
-  const float root = std::sqrt(t.place);
-  const glm::vec2 barycentric(root * (1.0F - u.y), root * u.y);
+  const glm::vec2 barycentric = uniform_on_triangle({t.place, u.y});
   const glm::vec3 point = interpolate(p, corner, barycentric);
   const glm::vec3 to = point - position;
   const float distance = glm::length(to);

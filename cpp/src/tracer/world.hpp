@@ -4,6 +4,7 @@
 #include <utility>
 #include <glm/geometric.hpp>
 
+#include "barycentric.hpp"
 #include "caustic_guide.hpp"
 #include "irradiance_cache.hpp"
 #include "lights.hpp"
@@ -26,6 +27,12 @@ struct World {
   bool is_light(const Hit& hit) const { return hit.geometry >= scene.objects.size(); }
   /// Number of a light's hit among the rectangle lights, then the sphere lights.
   int light_number(const Hit& hit) const { return static_cast<int>(hit.geometry - scene.objects.size()); }
+
+  /// Point of an object that a hit is on.
+  glm::vec3 position(const Hit& hit) const {
+    return interpolate(rays.positions(static_cast<int>(hit.geometry)),
+                       scene.objects[hit.geometry].mesh.triangles[hit.triangle], {hit.u, hit.v});
+  }
 
   /// Unit normal of what a ray hits, on the side from which triangles are counter-clockwise and spheres are
   /// round.

@@ -43,6 +43,11 @@ def _root() -> None:
     pass
 
 
+def _names(text: str) -> list[str]:
+    """Those of a list with commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}"
 
@@ -94,7 +99,7 @@ def scene_command(
     from mirrorbake.study.trade.study import advice, shrunk, study
 
     config = scene_config(scene, assignments, None, None, None, None, seed)
-    names = [name.strip() for name in axes.split(",") if name.strip()]
+    names = _names(axes)
     other = None if against is None else read_study(against, Identity.of(shrunk(config, pixels)))
     again = None if other is None else combinations_of(other)
     with _core.ThreadLimit(threads), progress() as add_bar:
@@ -241,7 +246,7 @@ def inference_command(
     from mirrorbake.study import inference
 
     config = scene_config(scene, assignments, None, f"{size}x{size}", None, None, None)
-    names = [name.strip() for name in run_times.split(",") if name.strip()]
+    names = _names(run_times)
     with _core.ThreadLimit(threads):
         lab = inference.Lab(prepare_stage(config), (azimuth, elevation), samples, reference_samples, map_size)
         results = inference.study(
@@ -288,7 +293,7 @@ def quality_command(
     from mirrorbake.study import quality
 
     config = scene_config(scene, assignments, None, size, None, em_size, seed)
-    names = [name.strip() for name in qualities.split(",") if name.strip()]
+    names = _names(qualities)
     with tempfile.TemporaryDirectory() as folder, progress() as add_bar:
         results = quality.study(
             config, Path(folder), names, views=views, threads=threads, progress=add_bar("study")

@@ -62,10 +62,12 @@ BeyondEdges TexelTopology::beyond_edges() const {
 TexelPlace TexelTopology::place(std::uint32_t texel) const {
   int level = 0;
   while (texel >= offsets_[static_cast<std::size_t>(level) + 1]) ++level;
-  const std::size_t i = texel - level_offset(level);
-  const auto w = static_cast<std::size_t>(width(level));
-  const auto h = static_cast<std::size_t>(height(level));
-  return {level, static_cast<int>(i / (w * h)), static_cast<int>(i / w % h), static_cast<int>(i % w)};
+  // Sides are powers of two.
+  const auto i = static_cast<unsigned>(texel - level_offset(level));
+  const auto w = static_cast<unsigned>(width(level)), h = static_cast<unsigned>(height(level));
+  const unsigned line = i >> std::countr_zero(w);
+  return {level, static_cast<int>(line >> std::countr_zero(h)), static_cast<int>(line & (h - 1)),
+          static_cast<int>(i & (w - 1))};
 }
 
 std::uint32_t TexelTopology::texel_at(const TexelPlace& place) const {

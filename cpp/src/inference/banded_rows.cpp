@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "mirrorbake/core/error.hpp"
@@ -21,6 +22,13 @@ constexpr std::size_t kBandEntries = std::size_t{1} << 15;
 constexpr std::size_t kNarrow = std::size_t{1} << 16;
 // Bands that are worked on one after the other, with one table of the texels.
 constexpr std::size_t kBandsPerTable = 16;
+
+// Rows of many views that follow each other lie far apart in memory, which is asked for them so far ahead.
+constexpr std::size_t kRowsAhead = 6;
+template <typename T>
+void ask_for(std::span<const T> values) {
+  for (std::size_t i = 0; i < values.size(); i += 64 / sizeof(T)) __builtin_prefetch(&values[i]);
+}
 
 // What a thread copies a band's texels to, and where it makes its shares.
 struct Local {
@@ -138,8 +146,9 @@ void BandedRows::find_reads(std::span<const RowOfView> order) {
     for (std::size_t b = begin; b < end; ++b) {
       Band& band = bands_[b];
       std::size_t lowest = bits.size(), highest = 0, count = 0;
-      for (const RowOfView& row : order.subspan(band.begin, band.end - band.begin)) {
-        for (const std::uint32_t texel : std::span(row.matrix->texels).subspan(row.first(), row.entries())) {
+      for (std::size_t r = band.begin; r < band.end; ++r) {
+        if (r + kRowsAhead < band.end) ask_for(order[r + kRowsAhead].texels());
+        for (const std::uint32_t texel : order[r].texels()) {
           const std::size_t word = texel / 64;
           const std::uint64_t bit = std::uint64_t{1} << (texel % 64);
           count += (bits[word] & bit) == 0 ? 1 : 0;
@@ -209,59 +218,63 @@ void BandedRows::pair_entries(std::span<const RowOfView> order) {
 }
 
 void BandedRows::pair_entries(Band& band, std::span<const RowOfView> order, const std::uint32_t* number_of) {
-  // Rows of as many pairs follow each other, or a processor guesses wrong at the end of almost every one.
-  struct Counted {
-    std::uint32_t pairs;
-    std::size_t row;
-    auto operator<=>(const Counted&) const = default;
-  };
-  std::vector<Counted> rows;
-  rows.reserve(band.end - band.begin);
-  std::vector<std::uint32_t> numbers;
-  numbers.reserve(band.entries);
-  std::size_t pairs = 0;
-  for (std::size_t r = band.begin; r < band.end; ++r) {
-    const std::uint32_t* texels = order[r].matrix->texels.data() + order[r].first();
-    const std::size_t before = pairs;
+  const std::span rows = order.subspan(band.begin, band.end - band.begin);
+  // Of all entries, with one number that follows none behind those of every row.
+  std::vector<std::uint32_t> numbers(band.entries + rows.size());
+  std::vector<std::uint32_t> first_number(rows.size()), pairs(rows.size());
+  std::uint32_t most = 0;
+  std::size_t all = 0;
+  std::uint32_t* next = numbers.data();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    first_number[i] = static_cast<std::uint32_t>(next - numbers.data());
     std::uint32_t single = kNoTexel;  // the number that would make a pair of the last one
-    for (std::size_t e = 0; e < order[r].entries(); ++e) {
-      const std::uint32_t number = number_of[texels[e]];
-      numbers.push_back(number);
+    if (i + kRowsAhead < rows.size()) ask_for(rows[i + kRowsAhead].texels());
+    for (const std::uint32_t texel : rows[i].texels()) {
+      const std::uint32_t number = number_of[texel];
+      *next++ = number;
       const bool second = number == single;
-      pairs += second ? 0 : 1;
+      pairs[i] += second ? 0 : 1;
       single = second ? kNoTexel : number + 1;
     }
-    rows.push_back({static_cast<std::uint32_t>(pairs - before), r});
+    *next++ = kNoTexel;
+    most = std::max(most, pairs[i]);
+    all += pairs[i];
   }
-  std::vector<std::size_t> first_number(rows.size());
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    first_number[i] = first_number[i - 1] + order[rows[i - 1].row].entries();
-  }
-  std::ranges::sort(rows);
+  // Rows of as many pairs follow each other, or a processor guesses wrong at the end of almost every one.
+  std::vector<std::uint32_t> place(most + 2);
+  for (const std::uint32_t count : pairs) ++place[count + 1];
+  for (std::size_t count = 1; count < place.size(); ++count) place[count] += place[count - 1];
+  std::vector<std::uint32_t> sorted(rows.size());
+  for (std::uint32_t i = 0; i < rows.size(); ++i) sorted[place[pairs[i]]++] = i;
 
-  const bool wide = band.entries > kNarrow;
-  if (wide) {
-    band.wide.resize(pairs);
-  } else {
-    band.narrow.resize(pairs);
-  }
-  band.weights.resize(2 * pairs);
-  std::size_t pair = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const RowOfView& row = order[rows[i].row];
-    const std::uint32_t* number = numbers.data() + first_number[rows[i].row - band.begin];
-    const float* weight = row.matrix->weights.data() + row.first();
-    counts_[band.begin + i] = rows[i].pairs;
+    const RowOfView& row = rows[sorted[i]];
+    counts_[band.begin + i] = pairs[sorted[i]];
     places_[first_place_[row.view] + row.row] = static_cast<std::uint32_t>(band.begin + i);
-    for (std::size_t e = 0; e < row.entries(); ++e, ++pair) {
-      if (wide) {
-        band.wide[pair] = number[e];
-      } else {
-        band.narrow[pair] = static_cast<std::uint16_t>(number[e]);
+  }
+  band.weights.resize(2 * all);
+  const auto put = [&](auto* to) {
+    float* weights = band.weights.data();
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+      if (i + kRowsAhead < sorted.size()) ask_for(rows[sorted[i + kRowsAhead]].weights());
+      const std::uint32_t* number = numbers.data() + first_number[sorted[i]];
+      const std::span weight = rows[sorted[i]].weights();
+      for (std::size_t e = 0; e < weight.size(); ++e) {
+        *to++ = static_cast<std::remove_pointer_t<decltype(to)>>(number[e]);
+        *weights++ = weight[e];
+        // Without a branch, which a processor would guess wrong at every other pair.
+        const bool second = number[e + 1] == number[e] + 1;
+        e += second ? 1 : 0;
+        *weights++ = second ? weight[e] : 0.0F;
       }
-      band.weights[2 * pair] = weight[e];
-      if (e + 1 < row.entries() && number[e + 1] == number[e] + 1) band.weights[2 * pair + 1] = weight[++e];
     }
+  };
+  if (band.entries > kNarrow) {
+    band.wide.resize(all);
+    put(band.wide.data());
+  } else {
+    band.narrow.resize(all);
+    put(band.narrow.data());
   }
 }
 
@@ -390,26 +403,6 @@ Channels* BandedRows::go_through(const Band& band, const Vector& weights, const 
                       target == nullptr ? nullptr : floats(target + band.begin), floats(texels),
                       floats(numbered(band, made)), squares.data());
   return made;
-}
-
-void BandedRows::diagonal(const Vector& weights, TexelVector& shares) const {
-  for_bands([&](const Band& band) {
-    Channels* made = clear(band);
-    Channels* to = numbered(band, made);
-    for_rows(band, [&](std::size_t r, const auto* numbers, const float* entries, std::size_t pairs) {
-      for (std::size_t p = 0; p < pairs; ++p) {
-        to[numbers[p]] += broadcast(entries[2 * p] * entries[2 * p]) * weights[r];
-        to[numbers[p] + 1U] += broadcast(entries[2 * p + 1] * entries[2 * p + 1]) * weights[r];
-      }
-    });
-    put(band, made, shares);
-  });
-  for_bands([&](const Band& band) {
-    for (std::size_t i = band.first_part; i < band.end_part; ++i) {
-      const auto& [unknown, share, weight] = parts_[i];
-      shares.set(unknown, shares.alone(unknown) + broadcast(weight * weight) * shares[share]);
-    }
-  });
 }
 
 }  // namespace mirrorbake

@@ -93,8 +93,6 @@ class BandedRows {
   void put(const Band& band, const Channels* made, TexelVector& shares) const;
   /// Adds to a band's own unknowns what the others gave to them, once all have.
   void add_parts(const Band& band, TexelVector& shares) const;
-  /// The diagonal of AᵀWA, in the first places of `shares`.
-  void diagonal(const Vector& weights, TexelVector& shares) const;
 
  private:
   struct RowOfView {
@@ -102,6 +100,10 @@ class BandedRows {
     std::size_t view, row;
     std::size_t first() const { return matrix->row_offsets[row]; }
     std::size_t entries() const { return matrix->row_offsets[row + 1] - matrix->row_offsets[row]; }
+    std::span<const std::uint32_t> texels() const {
+      return std::span(matrix->texels).subspan(first(), entries());
+    }
+    std::span<const float> weights() const { return std::span(matrix->weights).subspan(first(), entries()); }
   };
   void cut(std::size_t group, std::size_t first_row, std::span<const RowOfView> order);
   const std::vector<NodeWeight>& seen_by(const Band& band) const { return groups_[band.group]; }

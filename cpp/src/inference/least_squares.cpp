@@ -59,7 +59,7 @@ Flags held(Channels x, Channels s, Channels lower, Channels upper) {
 
 // Whether a round may go on: nothing has left its bounds, and nothing that is held on one wants inside.
 bool keeps(const Bounds& bounds, const TexelVector& x, const TexelVector& s,
-           const std::vector<InverseDiagonal>& inverse) {
+           const std::vector<HalfFloat>& inverse) {
   std::atomic<bool> kept{true};
   const std::size_t stride = x.stride();
   parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
@@ -77,53 +77,72 @@ bool keeps(const Bounds& bounds, const TexelVector& x, const TexelVector& s,
 
 }  // namespace
 
-LeastSquares::LeastSquares(const MapSolver::State& state, Vector row_weights, int stride)
+LeastSquares::LeastSquares(const MapSolver::State& state, Vector row_weights, float magnitude, int stride)
     : state_(state),
+      magnitude_(magnitude),
       stride_(stride),
       weights_(std::move(row_weights)),
       shares_(state.rows.shares(), stride),
-      diagonal_(state.rows.unknowns(), stride) {
-  state.rows.diagonal(weights_, shares_);
-  std::copy_n(shares_.data(), diagonal_.size() * diagonal_.stride(), diagonal_.data());
-  row_scale_ = find_row_scale();
+      row_sums_(vector()) {
+  find_row_sums();
+  find_preconditioner();
+}
+
+// Of AᵀWA, which has no entry below 0, and of what the regulariser's weights are relative to, Σ w (A 1)² over
+// the unknowns.
+void LeastSquares::find_row_sums() {
+  const BandedRows& rows = state_.rows;
+  TexelVector ones = vector();
+  std::fill_n(ones.data(), ones.size() * ones.stride(), 1.0F);
+  row_scale_ = rows.sum_over_bands([&](const Band& band) {
+    ChannelSums squares{};
+    rows.put(band, rows.normal(band, weights_, ones, squares), shares_);
+    return squares;
+  });
+  rows.for_bands([&](const Band& band) {
+    rows.add_parts(band, shares_);
+    std::copy_n(shares_.at(band.first), band.own * row_sums_.stride(), row_sums_.at(band.first));
+  });
+  for (double& sum : row_scale_) sum /= static_cast<double>(std::max<std::size_t>(rows.unknowns(), 1));
   scale_ = to_channels(row_scale_);
 }
 
-TexelVector LeastSquares::back_project(const Vector& target) {
-  const BandedRows& rows = state_.rows;
-  const TexelVector nothing = vector();
-  const auto transposed = [&](const Vector& t) {
-    TexelVector sums(rows.shares(), stride_);
-    rows.for_bands([&](const Band& band) {
-      ChannelSums squares{};
-      rows.put(band, rows.residual(band, weights_, t, nothing, squares), sums);
-    });
-    rows.for_bands([&](const Band& band) { rows.add_parts(band, sums); });
-    return sums;
-  };
-  const TexelVector wanted = transposed(target);
-  const TexelVector total = transposed(Vector(target.size(), broadcast(1.0F)));
+// The inverse of Σ |entries| of a row of the matrix, not of its diagonal: texels of coarse levels have small
+// weights in many rows, so that their diagonals say little of how much they move with others.
+void LeastSquares::find_preconditioner() {
+  free_.resize(row_sums_.size() * row_sums_.stride());
+  parallel_for(row_sums_.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Channels sum = row_sums_[i] + broadcast(state_.regulariser.row_sum(i) + magnitude_) * scale_;
+      const Channels inverse = sum > Channels{} ? broadcast(1.0F) / sum : Channels{};
+      // Rounded towards 0.
+      const auto halves = __builtin_convertvector(std::bit_cast<Words>(inverse) >> 16, Halves);
+      std::memcpy(&free_[row_sums_.stride() * i], &halves, row_sums_.stride() == 4 ? 8 : 6);
+    }
+  });
+}
+
+// What each unknown's rows want of it on average; s: AᵀW target.
+TexelVector LeastSquares::back_project(const TexelVector& s) const {
   TexelVector x = vector();
   parallel_for(x.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Channels by = total[i];
-      x.set(i, by > Channels{} ? wanted[i] / by : Channels{});
+      const Channels by = row_sums_[i];
+      x.set(i, by > Channels{} ? s[i] / by : Channels{});
     }
   });
   return x;
 }
 
-// Σ w (A 1)² over the unknowns.
-ChannelSums LeastSquares::find_row_scale() {
-  TexelVector ones = vector();
-  std::fill_n(ones.data(), ones.size() * ones.stride(), 1.0F);
-  ChannelSums sums = state_.rows.sum_over_bands([&](const Band& band) {
-    ChannelSums squares{};
-    state_.rows.normal(band, weights_, ones, squares);
-    return squares;
+ChannelSums LeastSquares::size_of(TexelVector& s) const {
+  // A step of no length changes nothing.
+  const Channels none{};
+  return parallel_channel_sums(s.size(), [&](std::size_t begin, std::size_t end) {
+    ChannelSums sums{};
+    solver_loops().gradient(end - begin, s.stride(), floats(&none), s.at(begin),
+                            free_.data() + s.stride() * begin, s.at(begin), sums.data());
+    return sums;
   });
-  for (double& sum : sums) sum /= static_cast<double>(std::max<std::size_t>(state_.rows.unknowns(), 1));
-  return sums;
 }
 
 // A sequence of rounds, each of them conjugate gradients on the texels that are free. The gradient is carried
@@ -138,13 +157,13 @@ ChannelSums LeastSquares::find_row_scale() {
 // between wrong bounds to the last digit is lost; a round that has left no bounds goes on. Clamping the
 // unbounded solution instead would be far from the best map: where the data leave a combination of texels
 // undetermined, large positive and negative ones cancel.
-SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const Bounds& bounds,
-                                   double tolerance, TexelVector& x) {
+SolveReport LeastSquares::minimise(const Vector& target, const Bounds& bounds, double tolerance,
+                                   TexelVector& x) {
   Iterate it{vector(), vector(), {}, {}};
-  it.inverse.resize(x.size() * x.stride());
-  evaluate(target, magnitude, it.step, it);
-  begin_round(magnitude, nullptr, it.step, it);
-  const ChannelSums start = it.gamma;
+  it.inverse.resize(free_.size());
+  evaluate(target, it.step, it);
+  const ChannelSums start = size_of(it.s);
+  if (x.size() == 0) x = back_project(it.s);
   const auto relative_gradient = [&] {
     double worst = 0;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -157,13 +176,13 @@ SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const 
   report.unknowns = state_.rows.unknowns();
   report.row_scale = row_scale_;
   clamp_to(bounds, x);
-  ChannelSums squares = evaluate(target, magnitude, x, it);
+  ChannelSums squares = evaluate(target, x, it);
   double length = kFirstRound;
   double best = std::numeric_limits<double>::infinity();
   int best_at = 0;
   TexelVector before;
   while (true) {
-    begin_round(magnitude, &bounds, x, it);
+    begin_round(bounds, x, it);
     report.relative_gradient = relative_gradient();
     if (!std::isfinite(report.relative_gradient)) throw NumericalError("conjugate gradients diverged");
     report.converged = report.relative_gradient <= tolerance;
@@ -184,17 +203,17 @@ SolveReport LeastSquares::minimise(const Vector& target, float magnitude, const 
         end += static_cast<int>(length);
         if (end > kLongestRound || !keeps(bounds, x, it.s, it.inverse)) break;
       }
-      step_once(magnitude, x, it);
+      step_once(x, it);
       ++report.iterations;
       // What follows can only be lost to rounding, or to the bounds.
       if (relative_gradient() <= kRoundAccuracy * tolerance) break;
     }
-    squares = project(target, magnitude, bounds, before, squares, x, it);
+    squares = project(target, bounds, before, squares, x, it);
   }
   return report;
 }
 
-ChannelSums LeastSquares::evaluate(const Vector& target, float magnitude, const TexelVector& x, Iterate& it) {
+ChannelSums LeastSquares::evaluate(const Vector& target, const TexelVector& x, Iterate& it) {
   const BandedRows& rows = state_.rows;
   state_.regulariser.prepare(x, scratch_);
   std::vector<double> of_rows(rows.bands());
@@ -202,7 +221,7 @@ ChannelSums LeastSquares::evaluate(const Vector& target, float magnitude, const 
     ChannelSums sums{}, regular{};
     Channels* made = rows.residual(band, weights_, target, x, sums);
     for (const double sum : sums) of_rows[rows.number_of(band)] += sum;
-    regularise(band, -1.0F, magnitude, x, made, regular);
+    regularise(band, -1.0F, x, made, regular);
     rows.put(band, made, shares_);
     for (std::size_t k = 0; k < 4; ++k) sums[k] -= regular[k];
     return sums;
@@ -216,38 +235,28 @@ ChannelSums LeastSquares::evaluate(const Vector& target, float magnitude, const 
   return squares;
 }
 
-void LeastSquares::regularise(const Band& band, float sign, float magnitude, const TexelVector& x,
-                              Channels* made, ChannelSums& sums) const {
-  if (!(magnitude > 0.0F || state_.regulariser.acts())) return;
+void LeastSquares::regularise(const Band& band, float sign, const TexelVector& x, Channels* made,
+                              ChannelSums& sums) const {
+  if (!(magnitude_ > 0.0F || state_.regulariser.acts())) return;
   const Channels factor = broadcast(sign) * scale_;
-  add(sums, state_.regulariser.add(band.first, band.first + band.own, factor, factor * broadcast(magnitude),
+  add(sums, state_.regulariser.add(band.first, band.first + band.own, factor, factor * broadcast(magnitude_),
                                    x, scratch_, made));
 }
 
-void LeastSquares::begin_round(float magnitude, const Bounds* bounds, const TexelVector& x, Iterate& it) {
+void LeastSquares::begin_round(const Bounds& bounds, const TexelVector& x, Iterate& it) {
+  const std::size_t stride = x.stride();
   it.gamma = parallel_channel_sums(x.size(), [&](std::size_t begin, std::size_t end) {
-    ChannelDoubles sums{};
-    for (std::size_t i = begin; i < end; ++i) {
-      const Channels s = it.s[i];
-      Channels inverse = preconditioner(i, magnitude);
-      if (bounds != nullptr) {
-        inverse = held(x[i], s, bounds->lower(i), bounds->upper(i)) ? Channels{} : inverse;
-      }
-      // As the loops read it, rounded towards 0.
-      const Words bits = std::bit_cast<Words>(inverse) >> 16;
-      const auto halves = __builtin_convertvector(bits, Halves);
-      std::memcpy(&it.inverse[x.stride() * i], &halves, x.stride() == 4 ? 8 : 6);
-      const Channels step = std::bit_cast<Channels>(bits << 16) * s;
-      it.step.set(i, step);
-      add_product(sums, s, step);
-    }
-    return to_sums(sums);
+    ChannelSums sums{};
+    solver_loops().begin(end - begin, stride, free_.data() + stride * begin, bounds.base.at(begin),
+                         floats(&bounds.largest), x.at(begin), it.s.at(begin),
+                         it.inverse.data() + stride * begin, it.step.at(begin), sums.data());
+    return sums;
   });
 }
 
 // One step of conjugate gradients, in three passes. The first makes the bands' shares of the matrix's product
 // with the step, and what length the step has; that product is added up by the second, nowhere kept.
-void LeastSquares::step_once(float magnitude, TexelVector& x, Iterate& it) {
+void LeastSquares::step_once(TexelVector& x, Iterate& it) {
   const BandedRows& rows = state_.rows;
   const SolverLoops& loops = solver_loops();
   const std::size_t stride = x.stride();
@@ -255,7 +264,7 @@ void LeastSquares::step_once(float magnitude, TexelVector& x, Iterate& it) {
   const ChannelSums curvature = rows.sum_over_bands([&](const Band& band) {
     ChannelSums sums{};
     Channels* made = rows.normal(band, weights_, it.step, sums);
-    regularise(band, 1.0F, magnitude, it.step, made, sums);
+    regularise(band, 1.0F, it.step, made, sums);
     rows.put(band, made, shares_);
     return sums;
   });
@@ -281,14 +290,13 @@ void LeastSquares::step_once(float magnitude, TexelVector& x, Iterate& it) {
 
 // Puts what a round made of `before` within the bounds, every channel as far along the round's step as does
 // not raise its sum of squares. Returns the sums.
-ChannelSums LeastSquares::project(const Vector& target, float magnitude, const Bounds& bounds,
-                                  const TexelVector& before, const ChannelSums& squares, TexelVector& x,
-                                  Iterate& it) {
+ChannelSums LeastSquares::project(const Vector& target, const Bounds& bounds, const TexelVector& before,
+                                  const ChannelSums& squares, TexelVector& x, Iterate& it) {
   const TexelVector unbounded = x;
   Channels share = broadcast(1.0F);
   for (int tries = 0;; ++tries) {
     clamp_to(bounds, x);
-    const ChannelSums now = evaluate(target, magnitude, x, it);
+    const ChannelSums now = evaluate(target, x, it);
     bool shorter = false;
     for (std::size_t k = 0; k < 4; ++k) {
       // Sums of floats are the same to about this share.

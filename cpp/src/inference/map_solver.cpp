@@ -118,6 +118,33 @@ Vector widen_rows(const SolveProblem& problem, std::span<const float> ViewTarget
   return wide;
 }
 
+// Goes on with `texels` of `channels` floats where no row sees them.
+void fill_unseen(const MapSolver::State& state, FillTowards towards, std::size_t channels,
+                 std::vector<float>& texels) {
+  Vector values;
+  for (std::size_t first = 0; first < state.seen.size();) {
+    for (const TexelTopology& map : state.maps) {
+      float* of_map = texels.data() + first * channels;
+      const std::span seen(state.seen.data() + first, map.texels());
+      first += map.texels();
+      // A map that nothing is known of stays 0.
+      if (std::ranges::find(seen, 1) == seen.end()) continue;
+      values.assign(map.texels(), Channels{});
+      parallel_for(map.texels(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          for (std::size_t k = 0; k < channels; ++k) values[i][k] = of_map[i * channels + k];
+        }
+      });
+      fill_unknown(map, seen, towards, values);
+      parallel_for(map.texels(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          for (std::size_t k = 0; k < channels; ++k) of_map[i * channels + k] = values[i][k];
+        }
+      });
+    }
+  }
+}
+
 double sum_of(const Vector& weights, int channels) {
   double sum = 0;
   for (const Channels& weight : weights) {
@@ -138,7 +165,8 @@ MapSolution MapSolver::solve(const SolveProblem& problem) const {
   Vector wanted = widen_rows(problem, &ViewTarget::target, s.rows);
   const Vector row_weights = widen_rows(problem, &ViewTarget::row_weights, s.rows);
   const int stride = problem.channels == 4 ? 4 : 3;
-  LeastSquares system(s, row_weights, stride);
+  const float magnitude = problem.prior.empty() ? 0.0F : s.options.prior_weight;
+  LeastSquares system(s, row_weights, magnitude, stride);
 
   // Of a map of all nodes, the texels that are seen.
   const auto seen_texels = [&](std::span<const float> map) {
@@ -164,36 +192,32 @@ MapSolution MapSolver::solve(const SolveProblem& problem) const {
   const Bounds bounds{base, largest};
 
   TexelVector x;
-  if (problem.initial.empty()) {
-    x = system.back_project(wanted);
-  } else {
+  if (!problem.initial.empty()) {
     x = seen_texels(problem.initial);
     for (std::size_t i = 0; i < n; ++i) x.set(i, x[i] - base[i]);
   }
 
   MapSolution solution;
-  const float magnitude = problem.prior.empty() ? 0.0F : s.options.prior_weight;
   solution.report =
-      system.minimise(wanted, magnitude, bounds, static_cast<double>(problem.slack * s.options.tolerance), x);
+      system.minimise(wanted, bounds, static_cast<double>(problem.slack * s.options.tolerance), x);
   const double weight = sum_of(row_weights, problem.channels);
   solution.report.rms_error = weight > 0 ? std::sqrt(system.data_squares() / weight) : 0.0;
 
-  Vector difference(s.seen.size());
-  for (std::size_t i = 0; i < n; ++i) difference[texels[i]] = x[i];
-  const FillTowards towards = problem.prior.empty() ? FillTowards::neighbours : FillTowards::zero;
-  for (std::size_t first = 0; problem.unseen == UnseenTexels::filled && first < difference.size();) {
-    for (const TexelTopology& map : s.maps) {
-      fill_unknown(map, {s.seen.data() + first, map.texels()}, towards,
-                   {difference.data() + first, map.texels()});
-      first += map.texels();
+  solution.texels.resize(s.seen.size() * c);
+  parallel_for(n, kVectorGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      std::copy_n(x.at(i), c, solution.texels.data() + texels[i] * c);
     }
+  });
+  if (problem.unseen == UnseenTexels::filled) {
+    fill_unseen(s, problem.prior.empty() ? FillTowards::neighbours : FillTowards::zero, c, solution.texels);
   }
-  solution.texels.resize(difference.size() * c);
-  parallel_for(difference.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(s.seen.size(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       for (std::size_t k = 0; k < c; ++k) {
         const float from = problem.prior.empty() ? 0.0F : problem.prior[i * c + k];
-        solution.texels[i * c + k] = std::clamp(from + difference[i][k], 0.0F, problem.upper_bounds[k]);
+        float& texel = solution.texels[i * c + k];
+        texel = std::clamp(from + texel, 0.0F, problem.upper_bounds[k]);
       }
     }
   });

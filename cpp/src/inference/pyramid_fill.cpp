@@ -1,6 +1,9 @@
 #include "pyramid_fill.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "mirrorbake/envmap/reads.hpp"
@@ -8,13 +11,26 @@
 namespace mirrorbake {
 namespace {
 
+// An even number, which ends where it began: in the map, not beside it.
 constexpr int kRelaxations = 4;
 
-// Calls body(i) for all i below a count, in parallel.
+// A row of a face on a level.
+struct Line {
+  int face, row;
+  std::uint32_t first;  // texel
+};
+
+// Calls body(line) for all rows of a level, in parallel.
 template <typename Body>
-void for_each(std::size_t count, const Body& body) {
-  parallel_for(count, 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) body(i);
+void for_lines(const TexelTopology& topology, int level, const Body& body) {
+  const auto width = static_cast<std::size_t>(topology.width(level));
+  const auto height = static_cast<std::size_t>(topology.height(level));
+  const std::size_t lines = height * static_cast<std::size_t>(topology.faces());
+  parallel_for(lines, 1 + 1024 / width, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      body(Line{static_cast<int>(i / height), static_cast<int>(i % height),
+                static_cast<std::uint32_t>(topology.level_offset(level) + i * width)});
+    }
   });
 }
 
@@ -33,27 +49,90 @@ Channels mean_of(std::span<const std::uint32_t> chosen, std::span<const Channels
 }
 
 // What the next coarser level shows at a texel's centre.
-Channels from_coarser(const TexelTopology& topology, std::uint32_t texel, int level,
+Channels from_coarser(const TexelTopology& topology, int level, const Line& line, int column,
                       std::span<const Channels> texels) {
-  const TexelPlace p = topology.place(texel);
   const int w = topology.width(level + 1);
   const int h = topology.height(level + 1);
-  const int row = (p.row - 1) / 2;
-  const int column = (p.column - 1) / 2;
-  if (p.row > 0 && p.column > 0 && row + 1 < h && column + 1 < w) {
+  const int coarse_row = (line.row - 1) / 2;
+  const int coarse_column = (column - 1) / 2;
+  if (line.row > 0 && column > 0 && coarse_row + 1 < h && coarse_column + 1 < w) {
     // Inside a face a centre lies a quarter of a coarse texel from the next coarse one's.
-    const float below = p.row % 2 == 0 ? 0.75F : 0.25F;
-    const float right = p.column % 2 == 0 ? 0.75F : 0.25F;
-    const Channels* corner = texels.data() + topology.index({level + 1, p.face, row, column});
+    const float below = line.row % 2 == 0 ? 0.75F : 0.25F;
+    const float right = column % 2 == 0 ? 0.75F : 0.25F;
+    const Channels* corner =
+        texels.data() + topology.index({level + 1, line.face, coarse_row, coarse_column});
     return broadcast((1.0F - below) * (1.0F - right)) * corner[0] +
            broadcast((1.0F - below) * right) * corner[1] + broadcast(below * (1.0F - right)) * corner[w] +
            broadcast(below * right) * corner[w + 1];
   }
   TexelReads coarser;
+  const auto texel = static_cast<std::uint32_t>(line.first + static_cast<std::uint32_t>(column));
   add_bilinear(topology, level + 1, topology.centre(texel), 1.0F, coarser);
   Channels value{};
   for (const TexelWeight& entry : coarser) value += broadcast(entry.weight) * texels[entry.texel];
   return value;
+}
+
+// A texel on the edge of a face, and what lies beside it, counted from the level's first.
+struct EdgeTexel {
+  std::uint32_t texel;
+  std::array<std::uint32_t, 4> neighbours;
+};
+
+std::vector<EdgeTexel> open_edges(const TexelTopology& topology, int level,
+                                  const std::vector<std::uint8_t>& filled) {
+  std::vector<EdgeTexel> edges;
+  const auto w = static_cast<std::uint32_t>(topology.width(level));
+  const auto h = static_cast<std::uint32_t>(topology.height(level));
+  const auto first = static_cast<std::uint32_t>(topology.level_offset(level));
+  std::uint32_t texel = first;
+  const auto add = [&](std::uint32_t t) {
+    if (filled[t]) return;
+    EdgeTexel edge{t - first, topology.neighbours(t)};
+    for (std::uint32_t& neighbour : edge.neighbours) neighbour -= neighbour == kNoTexel ? 0 : first;
+    edges.push_back(edge);
+  };
+  for (int face = 0; face < topology.faces(); ++face) {
+    for (std::uint32_t row = 0; row < h; ++row, texel += w) {
+      const bool inner = row > 0 && row + 1 < h;
+      for (std::uint32_t column = 0; column < w; column += inner && w > 1 ? w - 1 : 1) add(texel + column);
+    }
+  }
+  return edges;
+}
+
+// Every open texel of a level becomes the mean of its neighbours, as often as that; `beside` is for a level's
+// texels.
+void relax(const TexelTopology& topology, int level, const std::vector<std::uint8_t>& filled,
+           std::span<Channels> texels, Vector& beside) {
+  const std::size_t first = topology.level_offset(level);
+  const std::vector<EdgeTexel> edges = open_edges(topology, level, filled);
+  beside.resize(topology.level_offset(level + 1) - first);
+  const std::ptrdiff_t w = topology.width(level);
+  const int h = topology.height(level);
+  Channels *from = texels.data() + first, *to = beside.data();
+  for (int sweep = 0; sweep < kRelaxations; ++sweep, std::swap(from, to)) {
+    for_lines(topology, level, [&](const Line& line) {
+      const Channels* at = from + (line.first - first);
+      Channels* relaxed = to + (line.first - first);
+      const std::uint8_t* known = filled.data() + line.first;
+      if (line.row == 0 || line.row + 1 == h) {
+        std::copy_n(at, w, relaxed);
+        return;
+      }
+      relaxed[0] = at[0];
+      for (std::ptrdiff_t i = 1; i + 1 < w; ++i) {
+        const Channels mean = broadcast(0.25F) * (((at[i - w] + at[i + w]) + at[i - 1]) + at[i + 1]);
+        relaxed[i] = known[i] ? at[i] : mean;
+      }
+      relaxed[w - 1] = at[w - 1];
+    });
+    for (const EdgeTexel& edge : edges) {
+      int around = 0;
+      to[edge.texel] = mean_of(
+          edge.neighbours, {from, beside.size()}, [](std::uint32_t) { return true; }, around);
+    }
+  }
 }
 
 }  // namespace
@@ -63,15 +142,16 @@ void fill_unknown(const TexelTopology& topology, std::span<const std::uint8_t> k
   std::vector<std::uint8_t> filled(known.begin(), known.end());
   const auto is_filled = [&](std::uint32_t texel) { return filled[texel] != 0; };
   for (int level = 1; level < topology.levels(); ++level) {
-    const std::size_t first = topology.level_offset(level);
-    for_each(topology.level_offset(level + 1) - first, [&](std::size_t of_level) {
-      const auto i = static_cast<std::uint32_t>(first + of_level);
-      if (filled[i]) return;
-      int count = 0;
-      const Channels mean = mean_of(topology.children(i), texels, is_filled, count);
-      if (count == 0) return;
-      texels[i] = towards == FillTowards::zero ? broadcast(0.25F * static_cast<float>(count)) * mean : mean;
-      filled[i] = 1;
+    for_lines(topology, level, [&](const Line& line) {
+      for (std::uint32_t i = line.first; i < line.first + static_cast<std::uint32_t>(topology.width(level));
+           ++i) {
+        if (filled[i]) continue;
+        int count = 0;
+        const Channels mean = mean_of(topology.children(i), texels, is_filled, count);
+        if (count == 0) continue;
+        texels[i] = towards == FillTowards::zero ? broadcast(0.25F * static_cast<float>(count)) * mean : mean;
+        filled[i] = 1;
+      }
     });
   }
 
@@ -88,28 +168,15 @@ void fill_unknown(const TexelTopology& topology, std::span<const std::uint8_t> k
     filled[i] = 1;
   }
 
-  std::vector<std::uint32_t> open;
-  std::vector<std::array<std::uint32_t, 4>> neighbours;
-  std::vector<Channels> relaxed;
+  Vector beside;
   for (int level = coarsest - 1; level >= 0; --level) {
-    open.clear();
-    for (std::size_t i = topology.level_offset(level); i < topology.level_offset(level + 1); ++i) {
-      if (!filled[i]) open.push_back(static_cast<std::uint32_t>(i));
-    }
-    neighbours.resize(open.size());
-    relaxed.resize(open.size());
-    for_each(open.size(), [&](std::size_t i) {
-      texels[open[i]] = from_coarser(topology, open[i], level, texels);
-      neighbours[i] = topology.neighbours(open[i]);
+    for_lines(topology, level, [&](const Line& line) {
+      for (int column = 0; column < topology.width(level); ++column) {
+        const std::uint32_t i = line.first + static_cast<std::uint32_t>(column);
+        if (!filled[i]) texels[i] = from_coarser(topology, level, line, column, texels);
+      }
     });
-    for (int sweep = 0; sweep < kRelaxations; ++sweep) {
-      for_each(open.size(), [&](std::size_t i) {
-        int around = 0;
-        relaxed[i] = mean_of(
-            neighbours[i], texels, [](std::uint32_t) { return true; }, around);
-      });
-      for_each(open.size(), [&](std::size_t i) { texels[open[i]] = relaxed[i]; });
-    }
+    relax(topology, level, filled, texels, beside);
   }
 }
 

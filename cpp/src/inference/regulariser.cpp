@@ -6,7 +6,7 @@ namespace mirrorbake {
 
 Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<std::uint32_t>& number_of,
                          std::size_t numbers, const SolveOptions& options)
-    : options_(options), diagonal_(numbers) {
+    : options_(options), row_sums_(numbers) {
   if (options.smoothness == 0.0F && options.level_agreement == 0.0F) return;
   links_.resize(numbers);
   std::vector<std::array<std::uint32_t, 4>> children(numbers, {kNoTexel, kNoTexel, kNoTexel, kNoTexel});
@@ -49,15 +49,16 @@ Regulariser::Regulariser(std::span<const TexelTopology> maps, const std::vector<
   }
   parallel_for(numbers, kVectorGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      float d = 0.0F;
+      float sum = 0.0F;
       for (std::uint32_t& neighbour : links_[i].neighbours) {
         if (neighbour == kNoTexel) {
           neighbour = static_cast<std::uint32_t>(i);
         } else {
-          d += options_.smoothness;
+          sum += 2.0F * options_.smoothness;
         }
       }
-      diagonal_[i] = d + options_.level_agreement * 0.25F * (child_count(i) + links_[i].share);
+      const float of_child = links_[i].share > 0.0F ? 1.0F : 0.0F;
+      row_sums_[i] = sum + options_.level_agreement * 0.5F * (child_count(i) + of_child);
     }
   });
 }

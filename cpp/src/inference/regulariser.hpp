@@ -32,8 +32,8 @@ class Regulariser {
   ChannelSums add(std::size_t begin, std::size_t end, Channels factor, Channels near, const TexelVector& x,
                   const Vector& scratch, Channels* y) const;
 
-  /// Diagonal entry of G.
-  float diagonal(std::size_t number) const { return diagonal_[number]; }
+  /// Σ |entries| of a row of G.
+  float row_sum(std::size_t number) const { return row_sums_[number]; }
 
  private:
   /// A neighbour that is missing is the texel itself, which differs from itself by nothing.
@@ -51,7 +51,7 @@ class Regulariser {
   SolveOptions options_;
   std::vector<Links> links_;
   std::vector<Parent> parents_;  // by their numbers
-  std::vector<float> diagonal_;
+  std::vector<float> row_sums_;
 };
 
 }  // namespace mirrorbake

@@ -176,46 +176,84 @@ struct Pattern {
   }
 };
 
-inline Two inverse_of_eight(const InverseDiagonal* inverse) {
-  const Halves halves = *reinterpret_cast<const HalvesInMemory*>(inverse);
+inline Two floats_of(Halves halves) {
   return __builtin_bit_cast(Two, __builtin_convertvector(halves, Words) << 16);
 }
-inline float inverse_of_one(InverseDiagonal inverse) {
-  return __builtin_bit_cast(float, static_cast<std::uint32_t>(inverse) << 16);
+inline Two floats_of(const HalfFloat* halves) {
+  return floats_of(*reinterpret_cast<const HalvesInMemory*>(halves));
+}
+inline float float_of(HalfFloat half) {
+  return __builtin_bit_cast(float, static_cast<std::uint32_t>(half) << 16);
 }
 inline EightFloats& eight_at(float* values) { return *reinterpret_cast<EightFloats*>(values); }
 inline const EightFloats& eight_at(const float* values) {
   return *reinterpret_cast<const EightFloats*>(values);
 }
 
-void gradient_loop(std::size_t count, std::size_t stride, const float* a, const float* normal,
-                   const InverseDiagonal* inverse, float* s, double* gamma) {
-  const Pattern lengths(a, stride);
-  const std::size_t floats = count * stride;
+// sums[stride] += what `eight` makes of eight floats from i and `single` of those that are left, per channel;
+// k, of their places in the pattern. Products are added up in float before they go into doubles.
+template <typename Eight, typename Single>
+inline void add_up(std::size_t floats, std::size_t stride, double* sums, const Eight& eight,
+                   const Single& single) {
   std::size_t i = 0;
   while (i < floats) {
     Two parts[3] = {};
     for (std::size_t pattern = 0; pattern < kPatternsInFloat && i + kPattern <= floats; ++pattern) {
-      for (std::size_t k = 0; k < 3; ++k, i += 8) {
-        const Two next = eight_at(s + i) - eight_at(lengths.values + 8 * k) * eight_at(normal + i);
-        eight_at(s + i) = next;
-        parts[k] += next * (inverse_of_eight(inverse + i) * next);
-      }
+      for (std::size_t k = 0; k < 3; ++k, i += 8) parts[k] += eight(i, 8 * k);
     }
     float part[kPattern];
     for (std::size_t k = 0; k < 3; ++k) eight_at(part + 8 * k) = parts[k];
     if (i + kPattern > floats) {
-      for (std::size_t k = 0; i < floats; ++i, ++k) {
-        s[i] -= lengths.values[k] * normal[i];
-        part[k] += s[i] * (inverse_of_one(inverse[i]) * s[i]);
-      }
+      for (std::size_t k = 0; i < floats; ++i, ++k) part[k] += single(i, k);
     }
-    for (std::size_t k = 0; k < kPattern; ++k) gamma[k % stride] += static_cast<double>(part[k]);
+    for (std::size_t k = 0; k < kPattern; ++k) sums[k % stride] += static_cast<double>(part[k]);
   }
 }
 
+void begin_loop(std::size_t count, std::size_t stride, const HalfFloat* free, const float* base,
+                const float* upper, const float* x, const float* s, HalfFloat* inverse, float* step,
+                double* gamma) {
+  const Pattern uppers(upper, stride);
+  add_up(
+      count * stride, stride, gamma,
+      [&](std::size_t i, std::size_t k) {
+        const Two at = eight_at(x + i), slope = eight_at(s + i), below = eight_at(base + i);
+        const auto held = ((at <= -below) & (slope <= Two{})) |
+                          ((at >= eight_at(uppers.values + k) - below) & (slope >= Two{}));
+        const Halves halves =
+            *reinterpret_cast<const HalvesInMemory*>(free + i) & ~__builtin_convertvector(held, Halves);
+        *reinterpret_cast<HalvesInMemory*>(inverse + i) = halves;
+        const Two next = floats_of(halves) * slope;
+        eight_at(step + i) = next;
+        return slope * next;
+      },
+      [&](std::size_t i, std::size_t k) {
+        const bool held =
+            (x[i] <= -base[i] && s[i] <= 0.0F) || (x[i] >= uppers.values[k] - base[i] && s[i] >= 0.0F);
+        inverse[i] = held ? HalfFloat{0} : free[i];
+        step[i] = float_of(inverse[i]) * s[i];
+        return s[i] * step[i];
+      });
+}
+
+void gradient_loop(std::size_t count, std::size_t stride, const float* a, const float* normal,
+                   const HalfFloat* inverse, float* s, double* gamma) {
+  const Pattern lengths(a, stride);
+  add_up(
+      count * stride, stride, gamma,
+      [&](std::size_t i, std::size_t k) {
+        const Two next = eight_at(s + i) - eight_at(lengths.values + k) * eight_at(normal + i);
+        eight_at(s + i) = next;
+        return next * (floats_of(inverse + i) * next);
+      },
+      [&](std::size_t i, std::size_t k) {
+        s[i] -= lengths.values[k] * normal[i];
+        return s[i] * (float_of(inverse[i]) * s[i]);
+      });
+}
+
 void step_loop(std::size_t count, std::size_t stride, const float* a, const float* b,
-               const InverseDiagonal* inverse, const float* s, float* x, float* step) {
+               const HalfFloat* inverse, const float* s, float* x, float* step) {
   const Pattern lengths(a, stride), ratios(b, stride);
   const std::size_t floats = count * stride;
   std::size_t i = 0;
@@ -224,20 +262,20 @@ void step_loop(std::size_t count, std::size_t stride, const float* a, const floa
       const Two before = eight_at(step + i);
       eight_at(x + i) += eight_at(lengths.values + 8 * k) * before;
       eight_at(step + i) =
-          inverse_of_eight(inverse + i) * eight_at(s + i) + eight_at(ratios.values + 8 * k) * before;
+          floats_of(inverse + i) * eight_at(s + i) + eight_at(ratios.values + 8 * k) * before;
     }
   }
   for (std::size_t k = 0; i < floats; ++i, ++k) {
     const float before = step[i];
     x[i] += lengths.values[k] * before;
-    step[i] = inverse_of_one(inverse[i]) * s[i] + ratios.values[k] * before;
+    step[i] = float_of(inverse[i]) * s[i] + ratios.values[k] * before;
   }
 }
 
 }  // namespace
 
 extern const SolverLoops kSolverLoops;
-const SolverLoops kSolverLoops{&rows_loop, &widen_loop,    &gather_loop, &narrow_loop,
-                               &add_loop,  &gradient_loop, &step_loop};
+const SolverLoops kSolverLoops{&rows_loop, &widen_loop, &gather_loop,   &narrow_loop,
+                               &add_loop,  &begin_loop, &gradient_loop, &step_loop};
 
 }  // namespace mirrorbake::MIRRORBAKE_ISA

@@ -23,8 +23,8 @@ struct SharedPart {
   float weight;
 };
 
-/// The upper half of a float, 1 / diagonal: a preconditioner needs no more digits.
-using InverseDiagonal = std::uint16_t;
+/// The upper half of a float: a preconditioner needs no more digits.
+using HalfFloat = std::uint16_t;
 
 struct SolverLoops {
   /// With t = target − A x, or A x if there is no target: y += AᵀW t. squares[4] += Σ w t².
@@ -40,12 +40,18 @@ struct SolverLoops {
   void (*narrow)(std::size_t count, std::size_t stride, const float* from, float* to);
   /// shares[unknown] += weight · shares[share] of each part.
   void (*add)(std::size_t count, std::size_t stride, const SharedPart* parts, float* shares);
+  /// What a round begins with. Holds what lies on its bound, −base or upper − base, from which s does not
+  /// lead inside: inverse = 0 there, `free` elsewhere; step = inverse s; gamma[stride] += Σ s · step, per
+  /// channel.
+  void (*begin)(std::size_t count, std::size_t stride, const HalfFloat* free, const float* base,
+                const float* upper, const float* x, const float* s, HalfFloat* inverse, float* step,
+                double* gamma);
   /// s −= a · normal; gamma[stride] += Σ s · inverse s, per channel.
   void (*gradient)(std::size_t count, std::size_t stride, const float* a, const float* normal,
-                   const InverseDiagonal* inverse, float* s, double* gamma);
+                   const HalfFloat* inverse, float* s, double* gamma);
   /// x += a · step; step = inverse s + b · step.
   void (*step)(std::size_t count, std::size_t stride, const float* a, const float* b,
-               const InverseDiagonal* inverse, const float* s, float* x, float* step);
+               const HalfFloat* inverse, const float* s, float* x, float* step);
 };
 
 /// Those of the instruction set in use.

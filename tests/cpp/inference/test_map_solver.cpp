@@ -497,6 +497,21 @@ TEST(MapSolver, SolvesRowsOfAHundredThousandTexels) {
   for (std::size_t r = 0; r < shown.size(); ++r) EXPECT_NEAR(shown[r], target[r], 1e-2F * target[r]) << r;
 }
 
+// A x of a map of one colour has that colour, so that the sums of the matrix' rows tell all that one step
+// needs; with its diagonal as the preconditioner it takes eight. The preconditioner has eight binary digits.
+TEST(MapSolver, FindsAMapOfOneColourInOneStep) {
+  const Problem problem = make_problem(64, 16, 32);
+  const SolveOptions options{
+      .smoothness = 0.0F, .level_agreement = 0.0F, .prior_weight = 0.0F, .tolerance = 2e-2F};
+  const std::vector<float> target(problem.matrix.rows(), 3.0F), black(problem.layout.texels(), 0.0F);
+  const MapSolver solver = make_solver(problem.matrix, problem.layout, options);
+  const ViewTarget view{target, problem.row_weights};
+  const MapSolution solution = solver.solve({.channels = 1, .views = {&view, 1}, .initial = black});
+  EXPECT_TRUE(solution.report.converged);
+  EXPECT_EQ(solution.report.iterations, 1);
+  for (const float texel : solution.texels) ASSERT_NEAR(texel, 3.0F, 0.03F);
+}
+
 TEST(MapSolver, ReportsWhetherItConverged) {
   const Problem problem = make_problem(48, 4, 32);
   const std::vector<float> target = testing::random_values(problem.matrix.rows(), 2);

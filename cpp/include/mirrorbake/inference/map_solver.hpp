@@ -106,8 +106,8 @@ struct MapSolution {
 /// all solves share: it numbers the texels that are seen and builds the regulariser's stencil.
 ///
 /// The unknowns are the seen texels of all levels, solved for with conjugate gradients, preconditioned with
-/// the diagonal, all channels at once. Unseen texels are filled from seen ones across levels (pull-push);
-/// with a prior, they fall back to it with growing distance. Same bits on any number of threads.
+/// the sums of the matrix' rows, all channels at once. Unseen texels are filled from seen ones across levels
+/// (pull-push); with a prior, they fall back to it with growing distance. Same bits on any number of threads.
 class MapSolver {
  public:
   /// Throws InvalidArgument if a matrix has other columns than the maps have texels, a node's number or

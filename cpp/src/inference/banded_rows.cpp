@@ -394,14 +394,15 @@ void BandedRows::multiply(const TexelVector& x, Vector& b) const {
 
 Channels* BandedRows::go_through(const Band& band, const Vector& weights, const Channels* target,
                                  const TexelVector& x, ChannelSums& squares) const {
-  const Channels* texels = collect(band, x);
+  const bool at_zero = target != nullptr && x.size() == 0;
+  const Channels* texels = at_zero ? nullptr : collect(band, x);
   Channels* made = clear(band);
   const PairedRows rows{band.end - band.begin, counts_.data() + band.begin,
                         band.wide.empty() ? band.narrow.data() : nullptr, band.wide.data(),
                         band.weights.data()};
   solver_loops().rows(rows, floats(weights.data() + band.begin),
-                      target == nullptr ? nullptr : floats(target + band.begin), floats(texels),
-                      floats(numbered(band, made)), squares.data());
+                      target == nullptr ? nullptr : floats(target + band.begin),
+                      at_zero ? nullptr : floats(texels), floats(numbered(band, made)), squares.data());
   return made;
 }
 

@@ -80,7 +80,7 @@ class BandedRows {
   void multiply(const TexelVector& x, Vector& b) const;
   /// A band's shares of AᵀW (target − A x), to be changed and then to be `put` before the thread makes
   /// others: of the own unknowns, then of the others. Adds Σ w |target − A x|² of its rows to `squares`, per
-  /// channel.
+  /// channel. An empty x is 0.
   Channels* residual(const Band& band, const Vector& weights, const Vector& target, const TexelVector& x,
                      ChannelSums& squares) const {
     return go_through(band, weights, target.data(), x, squares);

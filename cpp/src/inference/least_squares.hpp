@@ -57,7 +57,7 @@ class LeastSquares {
   };
 
   TexelVector vector() const { return {state_.rows.unknowns(), stride_}; }
-  /// Finds s at x. Returns the sums of squares with the regulariser.
+  /// Finds s at x; an empty x is 0. Returns the sums of squares with the regulariser.
   ChannelSums evaluate(const Vector& target, const TexelVector& x, Iterate& it);
   /// Finds the preconditioner, 0 for what the gradient holds on a bound, and the first step.
   void begin_round(const Bounds& bounds, const TexelVector& x, Iterate& it);

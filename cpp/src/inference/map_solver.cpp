@@ -129,7 +129,7 @@ void fill_unseen(const MapSolver::State& state, FillTowards towards, std::size_t
       first += map.texels();
       // A map that nothing is known of stays 0.
       if (std::ranges::find(seen, 1) == seen.end()) continue;
-      values.assign(map.texels(), Channels{});
+      values.resize(map.texels());
       parallel_for(map.texels(), kVectorGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
           for (std::size_t k = 0; k < channels; ++k) values[i][k] = of_map[i * channels + k];

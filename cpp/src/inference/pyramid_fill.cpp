@@ -49,28 +49,46 @@ Channels mean_of(std::span<const std::uint32_t> chosen, std::span<const Channels
 }
 
 // What the next coarser level shows at a texel's centre.
-Channels from_coarser(const TexelTopology& topology, int level, const Line& line, int column,
+Channels from_coarser(const TexelTopology& topology, int level, std::uint32_t texel,
                       std::span<const Channels> texels) {
-  const int w = topology.width(level + 1);
-  const int h = topology.height(level + 1);
-  const int coarse_row = (line.row - 1) / 2;
-  const int coarse_column = (column - 1) / 2;
-  if (line.row > 0 && column > 0 && coarse_row + 1 < h && coarse_column + 1 < w) {
-    // Inside a face a centre lies a quarter of a coarse texel from the next coarse one's.
-    const float below = line.row % 2 == 0 ? 0.75F : 0.25F;
-    const float right = column % 2 == 0 ? 0.75F : 0.25F;
-    const Channels* corner =
-        texels.data() + topology.index({level + 1, line.face, coarse_row, coarse_column});
-    return broadcast((1.0F - below) * (1.0F - right)) * corner[0] +
-           broadcast((1.0F - below) * right) * corner[1] + broadcast(below * (1.0F - right)) * corner[w] +
-           broadcast(below * right) * corner[w + 1];
-  }
   TexelReads coarser;
-  const auto texel = static_cast<std::uint32_t>(line.first + static_cast<std::uint32_t>(column));
   add_bilinear(topology, level + 1, topology.centre(texel), 1.0F, coarser);
   Channels value{};
   for (const TexelWeight& entry : coarser) value += broadcast(entry.weight) * texels[entry.texel];
   return value;
+}
+
+// The same of all open texels of a row.
+void line_from_coarser(const TexelTopology& topology, int level, const Line& line,
+                       const std::vector<std::uint8_t>& filled, std::span<Channels> texels) {
+  const auto width = static_cast<std::uint32_t>(topology.width(level));
+  const auto w = static_cast<std::uint32_t>(topology.width(level + 1));
+  const auto open = [&](std::uint32_t column) { return filled[line.first + column] == 0; };
+  const auto by_direction = [&](std::uint32_t column) {
+    if (open(column))
+      texels[line.first + column] = from_coarser(topology, level, line.first + column, texels);
+  };
+  const bool inside = line.row > 0 && line.row + 1 < topology.height(level) && width > 2;
+  if (!inside) {
+    for (std::uint32_t column = 0; column < width; ++column) by_direction(column);
+    return;
+  }
+  // Inside a face a centre lies a quarter of a coarse texel from the next coarse one's.
+  const Channels* above = texels.data() + topology.index({level + 1, line.face, (line.row - 1) / 2, 0});
+  const Channels below_share = broadcast(line.row % 2 == 0 ? 0.75F : 0.25F);
+  Vector coarse(w);
+  for (std::uint32_t i = 0; i < w; ++i) {
+    coarse[i] = (broadcast(1.0F) - below_share) * above[i] + below_share * above[w + i];
+  }
+  by_direction(0);
+  for (std::uint32_t i = 0; i + 1 < w; ++i) {
+    const std::uint32_t column = 2 * i + 1;
+    const Channels left = coarse[i], right = coarse[i + 1];
+    if (open(column)) texels[line.first + column] = broadcast(0.75F) * left + broadcast(0.25F) * right;
+    if (open(column + 1))
+      texels[line.first + column + 1] = broadcast(0.25F) * left + broadcast(0.75F) * right;
+  }
+  by_direction(width - 1);
 }
 
 // A texel on the edge of a face, and what lies beside it, counted from the level's first.
@@ -170,12 +188,8 @@ void fill_unknown(const TexelTopology& topology, std::span<const std::uint8_t> k
 
   Vector beside;
   for (int level = coarsest - 1; level >= 0; --level) {
-    for_lines(topology, level, [&](const Line& line) {
-      for (int column = 0; column < topology.width(level); ++column) {
-        const std::uint32_t i = line.first + static_cast<std::uint32_t>(column);
-        if (!filled[i]) texels[i] = from_coarser(topology, level, line, column, texels);
-      }
-    });
+    for_lines(topology, level,
+              [&](const Line& line) { line_from_coarser(topology, level, line, filled, texels); });
     relax(topology, level, filled, texels, beside);
   }
 }

@@ -73,7 +73,9 @@ inline One read(const Number* numbers, const float* weights, std::size_t pairs, 
   return sum_of(even + odd);
 }
 
-template <bool has_target, typename Number>
+enum class Residual { of_target, of_product, of_both };
+
+template <Residual residual, typename Number>
 void go_through(const PairedRows& rows, const Number* numbers, const float* row_weights, const float* target,
                 const float* x, float* y, double* squares) {
   const float* weights = rows.weights;
@@ -82,8 +84,8 @@ void go_through(const PairedRows& rows, const Number* numbers, const float* row_
     One part{};
     for (std::size_t r = begin; r < end; ++r) {
       const std::size_t pairs = rows.counts[r];
-      One t = read(numbers, weights, pairs, x);
-      if (has_target) t = one_at(target, r) - t;
+      One t = residual == Residual::of_target ? one_at(target, r) : read(numbers, weights, pairs, x);
+      if (residual == Residual::of_both) t = one_at(target, r) - t;
       const One weighted = one_at(row_weights, r) * t;
       part += weighted * t;
       const Two given = twice(weighted);
@@ -97,22 +99,24 @@ void go_through(const PairedRows& rows, const Number* numbers, const float* row_
   }
 }
 
-template <bool has_target>
+template <Residual residual>
 void go_through(const PairedRows& rows, const float* row_weights, const float* target, const float* x,
                 float* y, double* squares) {
   if (rows.narrow != nullptr) {
-    go_through<has_target>(rows, rows.narrow, row_weights, target, x, y, squares);
+    go_through<residual>(rows, rows.narrow, row_weights, target, x, y, squares);
   } else {
-    go_through<has_target>(rows, rows.wide, row_weights, target, x, y, squares);
+    go_through<residual>(rows, rows.wide, row_weights, target, x, y, squares);
   }
 }
 
 void rows_loop(const PairedRows& rows, const float* weights, const float* target, const float* x, float* y,
                double* squares) {
-  if (target != nullptr) {
-    go_through<true>(rows, weights, target, x, y, squares);
+  if (x == nullptr) {
+    go_through<Residual::of_target>(rows, weights, target, x, y, squares);
+  } else if (target == nullptr) {
+    go_through<Residual::of_product>(rows, weights, target, x, y, squares);
   } else {
-    go_through<false>(rows, weights, target, x, y, squares);
+    go_through<Residual::of_both>(rows, weights, target, x, y, squares);
   }
 }
 

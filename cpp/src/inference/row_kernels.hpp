@@ -27,7 +27,8 @@ struct SharedPart {
 using HalfFloat = std::uint16_t;
 
 struct SolverLoops {
-  /// With t = target − A x, or A x if there is no target: y += AᵀW t. squares[4] += Σ w t².
+  /// With t = target − A x, or A x if there is no target, or the target if there is no x: y += AᵀW t.
+  /// squares[4] += Σ w t².
   void (*rows)(const PairedRows& rows, const float* weights, const float* target, const float* x, float* y,
                double* squares);
   /// Texels of a vector of unknowns, one after the other, made ones of a band; the fourth channel of three is

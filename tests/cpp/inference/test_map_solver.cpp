@@ -325,6 +325,14 @@ TEST(MapSolver, AnswersWithoutRowsWithoutWeightsAndWithoutARegulariser) {
   EXPECT_EQ(empty.texels, std::vector<float>(3 * nothing.columns, 0.0F));
   EXPECT_EQ(empty.report.unknowns, 0u);
 
+  // Rows that read nothing.
+  nothing.row_offsets = {0, 0, 0};
+  nothing.row_pixels = {0, 1};
+  const std::vector<float> ones(2, 1.0F);
+  const MapSolution unread = solve(make_solver(nothing, CubePyramidLayout::full(4)), ones, ones, 1);
+  EXPECT_EQ(unread.texels, std::vector<float>(nothing.columns, 0.0F));
+  EXPECT_EQ(unread.report.rms_error, 1.0);
+
   SolveOptions free;
   free.smoothness = free.level_agreement = free.prior_weight = 0.0F;
   const Problem problem = make_problem(16, 1, 16);

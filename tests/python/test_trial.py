@@ -42,8 +42,10 @@ def decibels(pem: OpenedPem, contender: str, point: float) -> float:
     return psnr(pem.run_time.render(contender, point, samples), traced.object, traced.coverage > 0.999)
 
 
-def test_the_trial_foretells_what_the_bake_reaches(tmp_path: Path) -> None:
-    config = parse_config(TEAPOT, "teapot")
+@pytest.mark.parametrize("material", [{}, {"roughness": 0.2, "albedo": 0.3}], ids=["mirror", "rough"])
+def test_the_trial_foretells_what_the_bake_reaches(tmp_path: Path, material: dict[str, Any]) -> None:
+    layers = {**TEAPOT["layers"], "diffuse": bool(material)}
+    config = parse_config({**TEAPOT, "material": material, "layers": layers}, "teapot")
     stage = prepare_stage(config)
     plan = analyze(stage)
     trial = run_trial(stage.planned(plan), plan)
@@ -89,7 +91,6 @@ def test_the_reason_is_what_limits(trial: Trial, reason: str) -> None:
         {"views": {"count": 1, "size": [32, 24]}},
         {"auto": {"quality": "draft"}},
         {"infer": {"fit": "layers"}},
-        {"material": {"roughness": 0.3}},
     ],
 )
 def test_where_there_is_nothing_to_try_nothing_is_said(change: dict[str, Any]) -> None:

@@ -18,11 +18,12 @@ from mirrorbake.pem.run_time import model_of, shell_maps
 from mirrorbake.proxy import proxy_from_attributes
 from mirrorbake.scene.plan import USUAL_WEIGHT, with_weight
 from mirrorbake.scene.pose import AT_REST
-from mirrorbake.scene.reflectance import materials_of
 from mirrorbake.tone import srgb_encoded
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.header import Header
@@ -40,7 +41,7 @@ SIDE = 96
 MAP_SIZE = 64
 """Texels along a side of the trial's maps, at most."""
 SAMPLES = 32
-"""Per pixel, of the trial's targets."""
+"""Per pixel, of the trial's targets at most, before those that `trace.noise` adds."""
 REFERENCE_SAMPLES = 64
 """Of each half of a reference: what a display makes of a noisy pixel is too dark, which targets share."""
 TOLERANCE = 3e-3
@@ -97,8 +98,6 @@ def trial_of(stage: Stage, plan: Plan) -> Trial | None:
         return None
     if config.infer.fit != "display" or config.infer.matrix == "probed":
         return None
-    if any(material.specular and material.lobe != "mirror" for material in materials_of(stage)):
-        return None
     return run_trial(stage, plan)
 
 
@@ -143,9 +142,9 @@ def run_trial(stage: Stage, plan: Plan) -> Trial | None:
     stage
         Planned, its scene at rest.
     plan
-        Of the bake; the trial has no static set, and its own samples per pixel.
+        Of the bake; the trial has its `trace.noise`, for that may be what limits, and no static set.
     """
-    stage, contents = small_bake(stage, small_plan(plan, {"trace.samples": SAMPLES, "trace.noise": 0.0}))
+    stage, contents = small_bake(stage, small_plan(plan, {"trace.samples": min(plan.samples, SAMPLES)}))
     header, space = contents.header, stage.space
     index = (len(space) - 1) // 2
     between = space.middle_after(index)
@@ -212,7 +211,7 @@ def blended(
 
 
 class Look:
-    """A view with two halves of a reference, without the body's own light, which all contenders share."""
+    """A view with two halves of a reference, and the body's own light, which all contenders share."""
 
     def __init__(self, stage: Stage, header: Header, point: Point) -> None:
         camera = stage.built.cameras.camera(point)
@@ -221,35 +220,48 @@ class Look:
             camera, stage.built.reflector, stage.options, self._model.places
         )
         pixels = camera.width * camera.height
-        halves, self.seen = [], np.ones(pixels, bool)
+        self._halves, self.seen = [], np.ones(pixels, bool)
         for half in range(2):
             options = stage.options
             options.samples_per_pixel, options.seed = REFERENCE_SAMPLES, SEED_OFFSET + half
             options.noise = 0.0
             traced = stage.tracer.trace_layers(camera, stage.built.reflector, options)
             pixel = np.asarray(traced.samples.pixel)
-            light = np.asarray(traced.sample_beauty) - np.asarray(traced.samples.diffuse)
             count = np.bincount(pixel, minlength=pixels)
-            sums = np.stack([np.bincount(pixel, light[:, c], pixels) for c in range(3)], axis=-1)
-            halves.append(sums / np.maximum(count, 1)[:, None])
             self.seen &= count == options.samples_per_pixel
-        self._halves = [srgb_encoded(half.astype(np.float32)).astype(np.float64) for half in halves]
+            beauty, body = (
+                _pixel_means(pixel, light, pixels) for light in (traced.sample_beauty, traced.samples.diffuse)
+            )
+            self._halves.append((_shown(beauty), body))
 
     def decibels(self, parts: Shells) -> float:
         drawn = np.asarray(_core.render_reflector(self._lookups, parts, None, self._model)).reshape(-1, 4)
-        shown = srgb_encoded(drawn[:, :3])
         seen = self.seen & (drawn[:, 3] > 0.99)
-        # The halves' noise is independent, so that it cancels in the product.
-        a, b = (shown[seen] - half[seen] for half in self._halves)
-        return _decibels(float(np.mean(a * b)) if seen.any() else 0.0)
+        if not seen.any():
+            return _decibels(0.0)
+        # The halves' noise is independent, so that it cancels in the product; each half has the body as it
+        # traced it itself, whose noise is then in picture and reference alike.
+        a, b = (_shown(drawn[seen, :3] + body[seen]) - shown[seen] for shown, body in self._halves)
+        return _decibels(float(np.mean(a * b)))
 
     def noise(self, samples: int, most: int, allowed: float) -> float:
         """Decibels of a target, by its samples and by what `trace.noise` makes of them."""
-        a, b = (half[self.seen] for half in self._halves)
+        a, b = (shown[self.seen] for shown, _ in self._halves)
         of_one = float(np.mean((a - b) ** 2)) / 2.0 * REFERENCE_SAMPLES
         if allowed > 0.0:
             return _decibels(max(min(of_one / samples, allowed**2), of_one / max(samples, most)))
         return _decibels(of_one / samples)
+
+
+def _pixel_means(pixel: NDArray[np.uint32], light: FloatArray, pixels: int) -> FloatArray:
+    """Return means (pixels, 3) of a reference's samples, where all of them meet the object."""
+    sums = [np.bincount(pixel, light[:, c], pixels) for c in range(3)]
+    return (np.stack(sums, axis=-1) / REFERENCE_SAMPLES).astype(np.float32)
+
+
+def _shown(light: FloatArray) -> NDArray[np.float64]:
+    shown: NDArray[np.float64] = srgb_encoded(light).astype(np.float64)
+    return shown
 
 
 def _decibels(squares: float) -> float:

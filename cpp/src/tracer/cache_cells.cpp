@@ -10,6 +10,8 @@
 #include <glm/geometric.hpp>
 
 #include "gather.hpp"
+#include "mirrorbake/core/interrupt.hpp"
+#include "sample_stream.hpp"
 #include "world.hpp"
 
 namespace mirrorbake::tracing {
@@ -26,6 +28,13 @@ constexpr int kBlocks = 16;
 // Quarters of quarters of a triangle, at most: a ground of two triangles a thousand times the object's size.
 constexpr int kMostCuts = 14;
 constexpr std::size_t kMostCells = std::size_t{1} << 17;
+// Where light may change at a step cells are as fine as this,
+constexpr float kFinenessOfSteps = 0.05F;
+// which is where what a corner sees is as many times closer than what another one sees, by so many rays.
+constexpr float kStep = 3.0F;
+constexpr std::uint32_t kLooks = 16;
+constexpr std::size_t kMostCellsOfSteps = std::size_t{1} << 16;
+constexpr float kUnknown = -1.0F;
 
 struct Box {
   glm::vec3 min{std::numeric_limits<float>::infinity()};
@@ -66,69 +75,126 @@ class CacheCells::Refiner {
   }
 
   void cut_triangles() {
-    // Breadth first, so that where the number of cells ends the cutting, it ends everywhere alike.
-    std::vector<Task> tasks;
-    for (std::uint32_t o = 0; o < cells_.nodes_of_corner_.size(); ++o) {
-      if (o == focus_) continue;
-      for (std::uint32_t t = 0; t < cells_.nodes_of_corner_[o].size() / 3; ++t) {
-        const Cell whole{cells_.triangle_nodes(o, t), {{0.0F, 0.0F}, {1.0F, 0.0F}, {0.0F, 1.0F}}, kNone};
-        if (!is_coarse(o, t, whole)) continue;
-        std::vector<std::uint32_t>& root = cells_.root_[o];
-        root.resize(cells_.nodes_of_corner_[o].size() / 3, kNone);
-        root[t] = static_cast<std::uint32_t>(cells_.cells_.size());
-        tasks.push_back({o, t, root[t]});
-        cells_.cells_.push_back(whole);
-      }
-    }
-    for (int cuts = 0; cuts < kMostCuts && !tasks.empty(); ++cuts) {
-      std::vector<Task> next;
-      for (const Task& task : tasks) {
-        if (cells_.cells_.size() + 4 > kMostCells) return;
-        cut(task);
-        const std::uint32_t first = cells_.cells_[task.cell].first_part;
-        for (std::uint32_t part = first; part < first + 4; ++part) {
-          if (is_coarse(task.object, task.triangle, cells_.cells_[part])) {
-            next.push_back({task.object, task.triangle, part});
-          }
-        }
-      }
-      tasks = std::move(next);
-    }
+    cut_while([&](const Task& task, const Cell& cell) { return is_wider(task, cell, kFineness); },
+              kMostCells);
+    cut_while([&](const Task& task, const Cell& cell) { return has_step(task, cell); },
+              kMostCells + kMostCellsOfSteps);
   }
 
  private:
   struct Task {
     std::uint32_t object;
     std::uint32_t triangle;
-    std::uint32_t cell;
+    std::uint32_t cell;  ///< kNone: the whole triangle
   };
 
-  bool is_coarse(std::uint32_t object, std::uint32_t triangle, const Cell& cell) const {
-    const std::span<const glm::vec3> p = world_.rays.positions(static_cast<int>(object));
-    const glm::uvec3 t = world_.scene.objects[object].mesh.triangles[triangle];
-    const glm::vec3 a = tracing::interpolate(p, t, cell.weights[0]);
-    const glm::vec3 b = tracing::interpolate(p, t, cell.weights[1]);
-    const glm::vec3 c = tracing::interpolate(p, t, cell.weights[2]);
+  template <typename IsCoarse>
+  void cut_while(const IsCoarse& is_coarse, std::size_t most_cells) {
+    std::vector<Task> tasks;
+    cells_.visit_cells([&](std::uint32_t object, std::uint32_t triangle, std::uint32_t cell, glm::uvec3) {
+      const Task task{object, triangle, cell};
+      if (object != focus_ && is_coarse(task, cell_of(task))) tasks.push_back(task);
+    });
+    // Breadth first, so that where the number of cells ends the cutting, it ends everywhere alike.
+    for (int cuts = 0; cuts < kMostCuts && !tasks.empty(); ++cuts) {
+      std::vector<Task> next;
+      for (const Task& task : tasks) {
+        if (cells_.cells_.size() + 5 > most_cells) return;
+        const std::uint32_t first = cut(task);
+        for (std::uint32_t part = first; part < first + 4; ++part) {
+          const Task of_part{task.object, task.triangle, part};
+          if (is_coarse(of_part, cells_.cells_[part])) next.push_back(of_part);
+        }
+      }
+      tasks = std::move(next);
+    }
+  }
+
+  Cell cell_of(const Task& task) const {
+    if (task.cell != kNone) return cells_.cells_[task.cell];
+    return {
+        cells_.triangle_nodes(task.object, task.triangle), {{0.0F, 0.0F}, {1.0F, 0.0F}, {0.0F, 1.0F}}, kNone};
+  }
+
+  std::array<glm::vec3, 3> corners_of(const Task& task, const Cell& cell) const {
+    const std::span<const glm::vec3> p = world_.rays.positions(static_cast<int>(task.object));
+    const glm::uvec3 t = world_.scene.objects[task.object].mesh.triangles[task.triangle];
+    return {tracing::interpolate(p, t, cell.weights[0]), tracing::interpolate(p, t, cell.weights[1]),
+            tracing::interpolate(p, t, cell.weights[2])};
+  }
+
+  static float longest_edge(const std::array<glm::vec3, 3>& p) {
+    return std::max({glm::distance(p[0], p[1]), glm::distance(p[1], p[2]), glm::distance(p[2], p[0])});
+  }
+
+  /// Whether its longest edge is more than `fineness` of its distance to the object in focus.
+  bool is_wider(const Task& task, const Cell& cell, float fineness) const {
+    const std::array<glm::vec3, 3> p = corners_of(task, cell);
     Box box;
-    box.add({a, b, c});
-    const float longest = std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
-    const float near = longest / kFineness - reach_;
+    box.add({p[0], p[1], p[2]});
+    const float near = longest_edge(p) / fineness - reach_;
     return box.distance(focus_box_) < near &&
            std::any_of(focus_blocks_.begin(), focus_blocks_.end(),
                        [&](const Box& block) { return box.distance(block) < near; });
   }
 
-  void cut(const Task& task) {
-    const Cell whole = cells_.cells_[task.cell];
+  /// Whether light may change at a step within it: something close covers one of its corners and leaves
+  /// another one open.
+  bool has_step(const Task& task, const Cell& cell) {
+    if (!is_wider(task, cell, kFinenessOfSteps)) return false;
+    std::array<float, 3> closeness;
+    for (int k = 0; k < 3; ++k) closeness[k] = closeness_at(task, cell, k);
+    const auto [least, most] = std::minmax_element(closeness.begin(), closeness.end());
+    return *most > kStep * *least && *most * longest_edge(corners_of(task, cell)) > 0.5F;
+  }
+
+  /// Mean of the inverse distances to what a node sees on its front, whose own inverse is Ward's measure of
+  /// how far its light reaches (Ward, Rubinstein and Clear, "A Ray Tracing Solution for Diffuse
+  /// Interreflection", SIGGRAPH 1988).
+  float closeness_at(const Task& task, const Cell& cell, int corner) {
+    const std::uint32_t node = cell.nodes[corner];
+    if (closeness_.size() <= node) closeness_.resize(cells_.nodes_, kUnknown);
+    if (closeness_[node] != kUnknown) return closeness_[node];
+    poll_interrupt();
+    // From within the cell: at a corner rays would start in the edge between two walls.
+    constexpr float kInwards = 0.1F;
+    const glm::vec2 middle = (cell.weights[0] + cell.weights[1] + cell.weights[2]) / 3.0F;
+    const glm::vec3 normal = face_normal(world_, task.object, task.triangle);
+    if (normal == glm::vec3(0.0F)) return 0.0F;
+    const Surface start = surface_of_triangle(world_, task.object, task.triangle,
+                                              glm::mix(cell.weights[corner], middle, kInwards), normal);
+    const Frame frame(normal);
+    float sum = 0.0F;
+    for (std::uint32_t r = 0; r < kLooks; ++r) {
+      const SampleStream stream{hash64(node), r};
+      const glm::vec3 direction = sample_cosine_hemisphere(frame, stream.get(diffuse_dimension));
+      const Hit hit =
+          world_.rays.all().intersect({offset_origin(start, direction), direction}, RayKind::reflection);
+      if (!hit.missed()) sum += 1.0F / std::max(hit.distance, std::numeric_limits<float>::min());
+    }
+    return closeness_[node] = sum / static_cast<float>(kLooks);
+  }
+
+  /// Returns the first of its four parts.
+  std::uint32_t cut(const Task& task) {
+    const Cell whole = cell_of(task);
+    std::uint32_t number = task.cell;
+    if (number == kNone) {
+      number = static_cast<std::uint32_t>(cells_.cells_.size());
+      std::vector<std::uint32_t>& root = cells_.root_[task.object];
+      root.resize(cells_.nodes_of_corner_[task.object].size() / 3, kNone);
+      root[task.triangle] = number;
+      cells_.cells_.push_back(whole);
+    }
     const auto first = static_cast<std::uint32_t>(cells_.cells_.size());
-    cells_.cells_[task.cell].first_part = first;
+    cells_.cells_[number].first_part = first;
     // Opposite to each corner.
     std::uint32_t node[3];
     glm::vec2 weights[3];
     for (int k = 0; k < 3; ++k) {
       const int a = (k + 1) % 3;
       const int b = (k + 2) % 3;
-      node[k] = middle(task.object, whole.nodes[a], whole.nodes[b]);
+      node[k] = middle(whole.nodes[a], whole.nodes[b]);
       weights[k] = 0.5F * (whole.weights[a] + whole.weights[b]);
     }
     for (int k = 0; k < 3; ++k) {
@@ -144,15 +210,13 @@ class CacheCells::Refiner {
       cells_.cells_.push_back(part);
     }
     cells_.cells_.push_back({{node[0], node[1], node[2]}, {weights[0], weights[1], weights[2]}, kNone});
+    return first;
   }
 
   /// Cells on both sides of an edge share the node in its middle.
-  std::uint32_t middle(std::uint32_t object, std::uint32_t a, std::uint32_t b) {
+  std::uint32_t middle(std::uint32_t a, std::uint32_t b) {
     const auto [found, is_new] = middles_.try_emplace(std::minmax(a, b), cells_.nodes_);
-    if (is_new) {
-      ++cells_.nodes_;
-      ++cells_.nodes_of_object_[object];
-    }
+    if (is_new) ++cells_.nodes_;
     return found->second;
   }
 
@@ -162,15 +226,17 @@ class CacheCells::Refiner {
   Box focus_box_;
   std::vector<Box> focus_blocks_;
   float reach_ = 0.0F;
+  std::vector<float> closeness_;  ///< of each node, 1/m, or kUnknown
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles_;
 };
 
 CacheCells::CacheCells(const World& world, int focus) {
   const std::size_t objects = world.scene.objects.size();
   nodes_of_corner_.resize(objects);
-  nodes_of_object_.resize(objects, 0);
+  vertex_nodes_.resize(objects, 0);
   root_.resize(objects);
   for (std::uint32_t o = 0; o < objects; ++o) add_object(world, o);
+  first_cut_ = nodes_;
   if (focus >= 0) Refiner(world, focus, *this).cut_triangles();
   list_corners();
 }
@@ -216,7 +282,7 @@ void CacheCells::add_object(const World& world, std::uint32_t o) {
       node[i] = entries[e].node;
     }
   }
-  nodes_of_object_[o] = nodes_ - before;
+  vertex_nodes_[o] = nodes_ - before;
 }
 
 template <typename Visit>

@@ -33,7 +33,9 @@ class CacheCells {
   CacheCells(const World& world, int focus);
 
   std::size_t node_count() const { return first_corner_.empty() ? 0 : first_corner_.size() - 1; }
-  std::size_t node_count(std::uint32_t object) const { return nodes_of_object_[object]; }
+  /// Of an object, those at its vertices.
+  std::size_t vertex_nodes(std::uint32_t object) const { return vertex_nodes_[object]; }
+  bool is_vertex(std::size_t node) const { return node < first_cut_; }
   std::span<const Corner> corners(std::size_t node) const {
     return {corners_.data() + first_corner_[node], corners_.data() + first_corner_[node + 1]};
   }
@@ -79,7 +81,8 @@ class CacheCells {
   void visit_cells(Visit visit) const;
 
   std::uint32_t nodes_ = 0;
-  std::vector<std::uint32_t> nodes_of_object_;
+  std::uint32_t first_cut_ = 0;              ///< the first node that is no vertex
+  std::vector<std::uint32_t> vertex_nodes_;  ///< per object
   /// Three per triangle, per object; empty for objects without diffuse reflection.
   std::vector<std::vector<std::uint32_t>> nodes_of_corner_;
   /// The cell of each triangle, kNone for most, per object; empty for objects of which no triangle is cut.

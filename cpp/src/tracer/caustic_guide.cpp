@@ -232,6 +232,10 @@ CausticGuide::CausticGuide(const World& world, std::uint64_t seed) {
   if (size_.x > 0) fill(photons.landed, photons.received / specular.weight());
 }
 
+float CausticGuide::strength(Cell cell) {
+  return kNoticeable * cell.rays / std::max(kMostRays - cell.rays, 1e-6F);
+}
+
 glm::vec3 CausticGuide::sample(Cell cell, glm::vec2 u) const {
   const std::uint32_t first = first_[cell.number];
   const CdfSample lit = sample_cdf(&cdf_[first], static_cast<int>(first_[cell.number + 1] - first) - 1, u.x);

@@ -53,6 +53,9 @@ class CausticGuide {
     return grid_[grid_index(glm::ivec3(place))];
   }
 
+  /// Irradiance of caustics there, as a share of that on the specular surfaces.
+  static float strength(Cell cell);
+
   /// A unit direction, with the density `pdf` per solid angle. `u` in [0,1)².
   glm::vec3 sample(Cell cell, glm::vec2 u) const;
   float pdf(Cell cell, glm::vec3 direction) const;

@@ -21,11 +21,13 @@ namespace {
 constexpr int kProbeRays = 16;
 // Later passes gather light that is dimmer and smoother than the first one's: a quarter of the rays will do.
 constexpr int kLaterShare = 4;
-// Caustics are as sharp as the mirrors: as many times the rays of the first pass, where there are any.
-constexpr int kCausticShare = 4;
+// Caustics are as sharp as the mirrors: they take as many times the rays of the first pass, by the root of
+// their strength, as their noise is in proportion to that.
+constexpr float kRaysPerRootOfCaustics = 20.0F;
+constexpr int kMostCausticShare = 16;
 // Bright surfaces are few and small: as many times fewer rays than the first pass.
 constexpr int kBrightShare = 4;
-// Nodes of an object up to which each takes all of its rays; beyond it the object's rays are as many as these
+// Nodes of an object's vertices up to which each takes all of its rays; beyond it they have as many as these
 // have, down to a share that the mean with a node and its ring of six makes up for.
 constexpr float kNodesWithAllRays = 16384.0F;
 constexpr float kLeastShare = 0.2F;
@@ -44,7 +46,7 @@ IrradianceCache& IrradianceCache::operator=(IrradianceCache&&) noexcept = defaul
 IrradianceCache::IrradianceCache(const World& world, const CausticGuide& guide, const TracerOptions& options)
     : cells_(world, options.focus), seed_(options.seed) {
   for (std::uint32_t o = 0; o < world.scene.objects.size(); ++o) {
-    const auto nodes = static_cast<float>(cells_.node_count(o));
+    const auto nodes = static_cast<float>(cells_.vertex_nodes(o));
     ray_share_.push_back(nodes > 0.0F ? std::clamp(kNodesWithAllRays / nodes, kLeastShare, 1.0F) : 1.0F);
   }
   gather(world, guide, options);
@@ -68,9 +70,13 @@ IrradianceCache::NodeRays IrradianceCache::node_rays(const World& world, std::si
   return rays;
 }
 
-glm::vec3 IrradianceCache::node_caustics(const World& world, const CausticGuide& guide, const NodeRays& rays,
-                                         int count) {
+glm::vec3 IrradianceCache::node_caustics(const World& world, const CausticGuide& guide,
+                                         const NodeRays& rays) {
   if (guide.knows_nothing()) return glm::vec3(0.0F);
+  const float strength = CausticGuide::strength(guide.cell(rays.starts[0].position));
+  const float share =
+      std::clamp(kRaysPerRootOfCaustics * std::sqrt(strength), 1.0F, static_cast<float>(kMostCausticShare));
+  const auto count = static_cast<int>(share * static_cast<float>(rays.along_cosine));
   glm::vec3 sum(0.0F);
   for (int r = 0; r < count; ++r) {
     sum += caustic_irradiance(world, guide, rays.start(r, count), rays.stream(r));
@@ -161,7 +167,11 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
 
   Sides previous;
   for (int pass = 0; pass < options.cache_bounces; ++pass) {
-    const auto direct = [&](const Surface& s, glm::vec2 u) { return direct_irradiance(world, s, u, false); };
+    const auto direct = [&](const Surface& s, glm::vec2 u) {
+      // Two samples that lie apart: mostly of two lights, or of two ends of one.
+      return 0.5F * (direct_irradiance(world, s, u, false) +
+                     direct_irradiance(world, s, glm::fract(u + 0.5F), false));
+    };
     const auto indirect = [&](const Surface& s, glm::vec2) { return interpolate(previous, s); };
     const int rays =
         pass == 0 ? options.cache_rays
@@ -174,7 +184,7 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
           if (given_up[side][node] != 0) continue;
           poll_interrupt();
           const int own = rays_of(node, rays, pass == 0 ? kLeastRays : kLeastLaterRays);
-          NodeRays of_node = node_rays(world, node, side, pass == 0 ? kCausticShare * own : own);
+          NodeRays of_node = node_rays(world, node, side, pass == 0 ? kMostCausticShare * own : own);
           of_node.along_cosine = own;
           if (pass > 0) {
             found.side[side][node] = gather_node(world, bright, of_node, indirect).irradiance;
@@ -186,7 +196,7 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
           // The bounce of what these find is gathered by the next pass.
           if (!gathered.given_up) {
             found.side[side][node] += from_bright(world, bright, of_node);
-            found.side[side][node] += node_caustics(world, guide, of_node, kCausticShare * own);
+            found.side[side][node] += node_caustics(world, guide, of_node);
           }
           buried[side][node] = gathered.buried ? 1 : 0;
           given_up[side][node] = gathered.given_up ? 1 : 0;
@@ -223,8 +233,12 @@ void IrradianceCache::add_further_bounces(const Sides& before, const Sides& last
   }
 }
 
+float IrradianceCache::ray_share(std::size_t node) const {
+  return cells_.is_vertex(node) ? ray_share_[cells_.corners(node).front().object] : 1.0F;
+}
+
 int IrradianceCache::rays_of(std::size_t node, int rays, int least) const {
-  const float share = ray_share_[cells_.corners(node).front().object];
+  const float share = ray_share(node);
   return std::max(static_cast<int>(share * static_cast<float>(rays)), std::min(rays, least));
 }
 
@@ -233,7 +247,7 @@ void IrradianceCache::share_rays(std::vector<glm::vec3>& values,
   const std::vector<glm::vec3> gathered = values;
   parallel_for(values.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t node = begin; node < end; ++node) {
-      if (buried[node] != 0 || ray_share_[cells_.corners(node).front().object] == 1.0F) continue;
+      if (buried[node] != 0 || ray_share(node) == 1.0F) continue;
       glm::vec3 sum(0.0F);
       int count = 0;
       for (const CacheCells::Corner& corner : cells_.corners(node)) {

@@ -28,8 +28,9 @@ class CausticGuide;
 /// of it; they take the value of their neighbours, or triangles that stick out of the body would fade to
 /// black.
 ///
-/// On an object of many nodes each one takes fewer rays and the mean with its neighbours, whose rays it
-/// shares: what is gathered is as noisy as elsewhere, and blurred over distances that are small there.
+/// On an object of many vertices each one's node takes fewer rays and the mean with its neighbours, whose
+/// rays it shares: what is gathered is as noisy as elsewhere, and blurred over distances that are small there.
+/// Nodes that cuts have made share nothing, for cuts are where light changes.
 class IrradianceCache {
  public:
   IrradianceCache();
@@ -85,8 +86,7 @@ class IrradianceCache {
                          const Ray& ray, const Hit& hit, float cosine);
   /// What the rays to bright surfaces find; those along the cosine have the rest of it.
   static glm::vec3 from_bright(const World& world, const BrightSurfaces& bright, const NodeRays& rays);
-  static glm::vec3 node_caustics(const World& world, const CausticGuide& guide, const NodeRays& rays,
-                                 int count);
+  static glm::vec3 node_caustics(const World& world, const CausticGuide& guide, const NodeRays& rays);
   /// Adds up caustics and what the passes bring.
   void gather(const World& world, const CausticGuide& guide, const TracerOptions& options);
   /// Those after the last one that is followed: each keeps of the one before what the last one kept.
@@ -94,10 +94,12 @@ class IrradianceCache {
   void fill_buried(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
   /// Takes means with the neighbours, buried ones left out, where nodes have a share of the rays.
   void share_rays(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
+  /// Of the rays that nodes have elsewhere, in (0,1].
+  float ray_share(std::size_t node) const;
   int rays_of(std::size_t node, int rays, int least) const;
 
   CacheCells cells_;
-  std::vector<float> ray_share_;  ///< per object, of the rays that a node has elsewhere, in (0,1]
+  std::vector<float> ray_share_;  ///< per object, of nodes at vertices
   Sides total_;
   std::uint64_t seed_ = 0;
 };

@@ -117,11 +117,11 @@ class View:
         return Agreement((first, second), noise, spent, psnr(one, other, covered & also), seconds)
 
 
-BIAS_SIDE, BLOCK, BIAS_SEEDS = 64, 8, 4
-"""Pixels of a picture, and of a block; and pictures whose scatter tells the error of their mean."""
+BIAS_SIDE, BLOCK = 64, 8
+"""Pixels of a picture, and of a block."""
 
 
-def bias(samples: int) -> dict[Indirect, tuple[float, float, float]]:
+def bias(samples: int, pictures: int) -> dict[Indirect, tuple[float, float, float]]:
     """Compare light that is cached, or none, with paths: the teapot's view in blocks.
 
     All take the same random numbers, so that what they share cancels.
@@ -129,7 +129,9 @@ def bias(samples: int) -> dict[Indirect, tuple[float, float, float]]:
     Parameters
     ----------
     samples
-        Per pixel, of each of `BIAS_SEEDS` pictures.
+        Per pixel, of each picture.
+    pictures
+        Whose scatter tells the error of their mean.
 
     Returns
     -------
@@ -137,14 +139,14 @@ def bias(samples: int) -> dict[Indirect, tuple[float, float, float]]:
         shares of the mean radiance. Blocks count that the object covers by a quarter.
     """
     view = View(side=BIAS_SIDE)
-    paths = [view.blocks("path", samples, seed) for seed in range(BIAS_SEEDS)]
+    paths = [view.blocks("path", samples, seed) for seed in range(pictures)]
     hits = np.sum([count for _, count in paths], axis=0)
     kept = hits > 0.25 * hits.max()
     whole = np.mean([light[kept] / count[kept] for light, count in paths], axis=0)
     found: dict[Indirect, tuple[float, float, float]] = {}
     modes: tuple[Indirect, ...] = ("cached", "none")
     for mode in modes:
-        others = [view.blocks(mode, samples, seed) for seed in range(BIAS_SEEDS)]
+        others = [view.blocks(mode, samples, seed) for seed in range(pictures)]
         off = np.array(
             [
                 (a[kept] / m[kept] - b[kept] / n[kept]) / whole.mean()
@@ -152,7 +154,7 @@ def bias(samples: int) -> dict[Indirect, tuple[float, float, float]]:
             ]
         )
         mean = off.mean(axis=0)
-        error = off.std(axis=0, ddof=1) / BIAS_SEEDS**0.5
+        error = off.std(axis=0, ddof=1) / pictures**0.5
         found[mode] = (float(mean.mean()), float(mean[np.abs(mean).argmax()]), float(error.max()))
     return found
 
@@ -163,11 +165,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--object", help="an .obj, .gltf or .glb file instead of the teapot")
     parser.add_argument("--sky", help="a panorama instead of the room")
     parser.add_argument("--bias", action="store_true", help="of cached light against paths, in blocks")
+    parser.add_argument(
+        "--pictures", type=int, default=4, metavar="N", help="of 1024 samples a pixel for --bias, 2 or more"
+    )
     options = parser.parse_args(arguments)
     if options.bias and (options.object or options.sky):
         parser.error("--bias is measured of the teapot in its room, without --object and --sky")
+    if options.pictures < 2:
+        parser.error(f"--pictures {options.pictures}: expected 2 or more")
     if options.bias:
-        for mode, (mean, worst, error) in bias(1024).items():
+        for mode, (mean, worst, error) in bias(1024, options.pictures).items():
             print(f"{mode}: {mean:+.1%} in the mean, {worst:+.1%} in the worst block, ±{error:.1%} at most")
         return
     view = View(options.object, options.sky)

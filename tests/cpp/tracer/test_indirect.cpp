@@ -217,6 +217,39 @@ TEST(IndirectLight, CacheIsFinerAroundTheFocus) {
   EXPECT_LT(seen_of_vertices, 0.1 * glow);
 }
 
+// A board that stands off a wall: nodes of the wall behind it are dark, and those of coarse cells would darken
+// what is above its edge.
+TEST(IndirectLight, CacheIsFinerWhereLightChangesAtAStep) {
+  Scene scene;
+  const int ball = add_object(scene, make_sphere({0, 0.1F, 0}, 0.1F, 32), matte(glm::vec3(0.0F)));
+  const Material white = matte(glm::vec3(0.8F));
+  add_object(scene, make_rectangle({-2, 0, -1.5F}, {4, 0, 0}, {0, 2, 0}), white);
+  add_object(scene, make_rectangle({-2, 0, 2.5F}, {4, 0, 0}, {0, 0, -4}), white);
+  constexpr float kEdge = 0.67F;
+  add_object(scene, make_rectangle({-1, 0, -1.47F}, {2, 0, 0}, {0, kEdge, 0}), white);
+  scene.environment = constant_environment(1.0F);
+  TracerOptions options = indirect(IndirectLight::cached);
+  options.cache_rays = 512;
+  options.focus = ball;
+  const Tracer cached(scene, options);
+  const Tracer with_paths(scene, indirect(IndirectLight::path));
+  const Tracer direct_only(scene, indirect(IndirectLight::none));
+  double glow = 0.0;
+  double error = 0.0;
+  double seen = 0.0;
+  for (const float x : {-0.55F, -0.2F, 0.07F, 0.31F, 0.6F}) {
+    Camera camera = spot({x, kEdge + 0.05F, -1.5F});
+    camera.eye = {x, 1.2F, 0.4F};
+    const double direct = estimate(direct_only.trace_beauty(camera, {})).mean;
+    const Estimate path = estimate(with_paths.trace_beauty(camera, {}));
+    glow += path.mean - direct;
+    error += path.error;
+    seen += estimate(cached.trace_beauty(camera, {})).mean - direct;
+  }
+  ASSERT_GT(glow, 100.0 * error);
+  EXPECT_NEAR(seen, glow, 0.04 * glow);
+}
+
 TEST(IndirectLight, FocusIsAnObjectOrNone) {
   Scene scene;
   add_object(scene, floor_at(0.0F), matte(glm::vec3(0.5F)));

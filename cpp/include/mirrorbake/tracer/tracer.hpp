@@ -37,8 +37,8 @@ struct EnumNames<IndirectLight> {
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
   /// Gather rays per vertex of the `cached` indirect light, 1…65536; a quarter of them after the first
-  /// bounce, four times as many for caustics. Of an object of more than 16384 vertices each takes a share,
-  /// down to a fifth, and shares its neighbours'.
+  /// bounce, one to sixteen times as many for caustics, the brighter the more. Of an object of more than
+  /// 16384 vertices each takes a share, down to a fifth, and shares its neighbours'.
   int cache_rays = 64;
   int cache_bounces = 6;   ///< diffuse bounces that `cached` follows, 1…16
   std::uint64_t seed = 0;  ///< of the cache

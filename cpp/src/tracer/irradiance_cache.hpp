@@ -29,8 +29,8 @@ class CausticGuide;
 /// black.
 ///
 /// On an object of many vertices each one's node takes fewer rays and the mean with its neighbours, whose
-/// rays it shares: what is gathered is as noisy as elsewhere, and blurred over distances that are small there.
-/// Nodes that cuts have made share nothing, for cuts are where light changes.
+/// rays it shares: what is gathered is as noisy as elsewhere, and blurred over distances that are small
+/// there. Nodes that cuts have made share nothing, for cuts are where light changes.
 class IrradianceCache {
  public:
   IrradianceCache();

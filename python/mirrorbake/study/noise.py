@@ -175,7 +175,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error(f"--pictures {options.pictures}: expected 2 or more")
     if options.bias:
         for mode, (mean, worst, error) in bias(1024, options.pictures).items():
-            print(f"{mode}: {mean:+.1%} in the mean, {worst:+.1%} in the worst block, ±{error:.1%} at most")
+            print(f"{mode}: {mean:+.2%} in the mean, {worst:+.2%} in the worst block, ±{error:.2%} at most")
         return
     view = View(options.object, options.sky)
     print("| samples | against | noise allowed | spent | agree to | processor seconds |")

@@ -25,7 +25,7 @@ def main(folder: str) -> None:
         change = f"{trial.near - study.base.near:+.1f}" if trial.settings else ""
         print(
             f"| {f'`{axis}`' if axis else ''} | {label} | {trial.bytes_per_degree / 1e3:.0f} kB | "
-            f"{trial.bake_s:.0f} | {trial.draw_ms:.0f} | {' | '.join(figures)} | {change} |"
+            f"{trial.bake_s:.1f} | {trial.draw_ms:.0f} | {' | '.join(figures)} | {change} |"
         )
 
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from mirrorbake.errors import InputError
-from mirrorbake.study.trade.study import COSTS, SAME_PRICE, STUDY_NAME, Study
+from mirrorbake.study.trade.study import COSTS, NOTICEABLE, SAME_PRICE, STUDY_NAME, Study
 from mirrorbake.study.trade.trial import Trial
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class FrontStability:
     steps: int
     """Of the other study's front."""
     kept: int
-    """Of those on this study's front, too."""
+    """Of those that hold: what this study finds for no higher price is not better by `NOTICEABLE`."""
     off: float
     """DB at most that the other's front, drawn by this study's figures, is below this study's at its price;
     infinite where it has nothing as cheap."""
@@ -66,8 +66,8 @@ class Stability:
             if math.isfinite(front.off):
                 below = f"is at most {front.off:.2f} dB below this one's best at any price"
             found.append(
-                f"{NOUNS[cost]}: {front.kept} of {front.steps} steps of the other's front are on this one; "
-                f"it {below}; costs differ by {front.ratio:.0%}"
+                f"{NOUNS[cost]}: {front.kept} of {front.steps} steps of the other's front hold, nothing as "
+                f"cheap is better by {NOTICEABLE} dB; it {below}; costs differ by {front.ratio:.0%}"
             )
         return found
 
@@ -129,15 +129,17 @@ def _front_stability(
     mine = here.front(cost)
     theirs = {_key(trial) for trial in there.front(cost)}
     again = [trial for trial in here.all if _key(trial) in theirs]
+    kept = sum(_best(mine, getattr(step, cost), cost) <= (step.near or 0.0) + NOTICEABLE for step in again)
     off = 0.0
     for step in mine:
-        price = SAME_PRICE * getattr(step, cost)
-        best = max((trial.near or 0.0 for trial in again if getattr(trial, cost) <= price), default=-math.inf)
-        off = max(off, (step.near or 0.0) - best)
+        off = max(off, (step.near or 0.0) - _best(again, SAME_PRICE * getattr(step, cost), cost))
     ratios = [math.log(getattr(a, cost) / getattr(b, cost)) for a, b in pairs]
-    return FrontStability(
-        len(theirs), sum(_key(trial) in theirs for trial in mine), off, _root_mean_square(ratios)
-    )
+    return FrontStability(len(theirs), kept, off, _root_mean_square(ratios))
+
+
+def _best(trials: Sequence[Trial], price: float, cost: str) -> float:
+    """DB of the best of some trials for a price; -infinity if there is none."""
+    return max((trial.near or 0.0 for trial in trials if getattr(trial, cost) <= price), default=-math.inf)
 
 
 def _of(study: Study, trials: Sequence[Trial]) -> Study:

@@ -34,10 +34,10 @@ SINGLES_SHARE = 0.75
 """Of the time that there is, after which combinations are tried, for what it tells of single choices."""
 COMBINATIONS = 15
 """Tried at most, after the single axes."""
-NOTICEABLE = 0.25
-"""dB that a dearer choice has to gain to be on the front: the standard deviation of a figure under another
-seed, of the teapot in 96² pixels at 16 samples."""
-SAME_PRICE = 1.1
+NOTICEABLE = 0.5
+"""dB that a dearer choice has to gain to be on the front: twice the standard deviation that a gain has under
+another seed, of the teapot."""
+SAME_PRICE = 1.25
 """Ratio of costs up to which a front has one step: what measuring them again can change."""
 MOST_COMBINED = 50_000
 
@@ -105,9 +105,9 @@ def study(
 ) -> Study:
     """Measure what a scene's choices cost and how far off they are.
 
-    A few views from the middle of the arc are baked with each setting, looked at from a sample, between two
-    and 5° past the last, and compared with references that all trials share. What is measured is kept in
-    `folder`/study.json after every trial: an interrupted study goes on where it stopped.
+    A few views from the middle of the arc are baked with each setting, looked at from each sample, between
+    every two and 5° past the last, and compared with references that all trials share. What is measured is
+    kept in `folder`/study.json after every trial: an interrupted study goes on where it stopped.
 
     Parameters
     ----------

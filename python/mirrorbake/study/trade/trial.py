@@ -7,14 +7,14 @@ import json
 import shutil
 import time
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mirrorbake import _core
 from mirrorbake.bake.bake import bake
 from mirrorbake.evaluate.contenders import Contender, main_run_time, run_time_of
 from mirrorbake.evaluate.evaluate import Onlooker
 from mirrorbake.evaluate.metrics import flip
-from mirrorbake.evaluate.places import View, choose_views
+from mirrorbake.evaluate.places import choose_views
 from mirrorbake.pem.opened import OpenedPem
 from mirrorbake.pem.pyramid import coarse_end, pyramid_of, size_of
 from mirrorbake.pem.run_time import RunTime
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from mirrorbake.study.trade.axes import Setting
 
 PLACES = ("on", "between", "off_5")
-"""From which a trial is looked at."""
+"""From which a trial is looked at: every sample, between every two of them, and past the last."""
 DRAW_REPEATS = 5
 REFERENCE_MARGIN = 10.0
 """dB that references get to spare, so that most better trials are measured against the same ones."""
@@ -55,11 +55,11 @@ class Trial:
     draw_ms: float
     """Of one core, to draw a frame from maps in memory, in software."""
     psnr: dict[str, float | None]
-    """dB by place."""
+    """dB by place, the mean of its views."""
     flip: dict[str, float | None]
-    """By place."""
+    """By place, the mean of its views."""
     ceiling: dict[str, float]
-    """dB of the references by place."""
+    """dB of the references by place, of the view whose is lowest."""
 
     @property
     def near(self) -> float | None:
@@ -75,6 +75,14 @@ class Trial:
     def from_dict(data: Mapping[str, Any]) -> Trial:
         """Inverse of `to_dict`. Raises TypeError for what is not one."""
         return Trial(**data)
+
+
+class _Look(NamedTuple):
+    """How a trial looks in one view."""
+
+    psnr: float | None
+    flip: float | None
+    ceiling: float
 
 
 class Bench:
@@ -163,15 +171,15 @@ class Bench:
         return self._look(*self._bake(overridden(self.config, overrides), self._folder / "trial"), settings)
 
     def _bake(self, config: SceneConfig, directory: Path) -> tuple[OpenedPem, float]:
-        """Bake the samples that are looked at: the PEM, and seconds of processor time per sample."""
+        """Bake a PEM; return it, and seconds of processor time per sample."""
         shutil.rmtree(directory, ignore_errors=True)
         stage = self.stage(config)
-        wanted = nodes_looked_at(config)
         watch = _Stopwatch(self._traces)
-        summary = bake(config, directory, watch, stage, samples=wanted)
+        summary = bake(config, directory, watch, stage)
         store = PemStore.open(directory)
         stage = stage.planned(summary.plan)
-        return OpenedPem(store, stage, RunTime(store, stage.built.triangles)), watch.seconds / len(wanted)
+        pem = OpenedPem(store, stage, RunTime(store, stage.built.triangles))
+        return pem, watch.seconds / len(pem.space)
 
     def _look(self, opened: OpenedPem, seconds: float, settings: Mapping[str, Setting]) -> Trial:
         pem, size = _remapped(opened, settings.values())
@@ -184,19 +192,15 @@ class Bench:
             contenders={"pem": contender},
             run_times=(main_run_time(pem),),
         )
-        psnr: dict[str, float | None] = {}
-        errors: dict[str, float | None] = {}
-        ceiling: dict[str, float] = {}
-        for view in _views(pem):
-            seen = onlooker.look(view)
+        looks: dict[str, list[_Look]] = {}
+        for view in choose_views(pem.stage.built.cameras, pem.space, every=True):
+            seen = onlooker.look(view) if view.place in PLACES else None
             if seen is None:
                 continue
             light, reference = seen.pictures["pem"][seen.run_time], seen.reference
-            psnr[view.place] = reference.psnr(light)
-            errors[view.place] = flip(
-                reference.images.composite(light), reference.images.beauty, reference.mask
-            )
-            ceiling[view.place] = reference.ceiling
+            picture = reference.images.composite(light)
+            error = flip(picture, reference.images.beauty, reference.mask)
+            looks.setdefault(view.place, []).append(_Look(reference.psnr(light), error, reference.ceiling))
         count = len(pem.store.header.space)
         views = pem.store.header.source.config["views"]
         per_degree = (count - 1) / abs(views["degrees"]) if count > 1 and views["degrees"] else 1.0
@@ -205,9 +209,9 @@ class Bench:
             bytes_per_degree=size * per_degree,
             bake_s=seconds * per_degree,
             draw_ms=_draw_ms(pem, drawing),
-            psnr=psnr,
-            flip=errors,
-            ceiling=ceiling,
+            psnr={place: _mean(look.psnr for look in several) for place, several in looks.items()},
+            flip={place: _mean(look.flip for look in several) for place, several in looks.items()},
+            ceiling={place: min(look.ceiling for look in several) for place, several in looks.items()},
         )
 
 
@@ -233,12 +237,9 @@ class _Stopwatch:
         return time.process_time() + self._traces.saved_s
 
 
-def _views(pem: OpenedPem) -> list[View]:
-    """The first view of each of `PLACES`."""
-    views = choose_views(pem.stage.built.cameras, pem.space)
-    return [
-        next(view for view in views if view.place == p) for p in PLACES if any(v.place == p for v in views)
-    ]
+def _mean(figures: Iterable[float | None]) -> float | None:
+    known = [figure for figure in figures if figure is not None]
+    return sum(known) / len(known) if known else None
 
 
 def _remapped(pem: OpenedPem, settings: Iterable[Setting]) -> tuple[OpenedPem, float]:
@@ -289,10 +290,3 @@ def _draw_ms(pem: OpenedPem, drawing: Drawing) -> float:
 def _middle(count: int) -> int:
     """Number of the sample that is looked at, of so many along the arc (`choose_views`)."""
     return (count - 1) // 2
-
-
-def nodes_looked_at(config: SceneConfig) -> list[int]:
-    """Numbers of the samples from whose maps `PLACES` are drawn: the middle one, and those up to the last."""
-    count = config.views.count
-    assert count is not None, "a study has a number of views"
-    return list(range(_middle(count), count))

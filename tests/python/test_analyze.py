@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mirrorbake import _core
-from mirrorbake.bake.analyze import MAX_DEPTH, MIRROR_SAMPLES, MOST_SAMPLES, analyze
+from mirrorbake.bake.analyze import FIRST_SAMPLES, LOBE_NOISE, MAX_DEPTH, MOST_FIRST_SAMPLES, analyze
 from mirrorbake.bake.bake import bake
 from mirrorbake.bake.count_parts import disagreement
 from mirrorbake.bake.map_sizes import LARGEST_MAP, SMALLEST_MAP
@@ -190,7 +190,7 @@ def test_what_a_part_sees_of_the_object_lies_about_it_unless_told(tmp_path: Path
         assert attributes["centre"] == attributes["origin"]
 
 
-def shiny_ball(folder: Path, roughness: float) -> Stage:
+def shiny_ball(folder: Path, roughness: float, lamp: float = 3.0) -> Stage:
     """Prepare a ball of metal in a file, on a floor that is lit from one side."""
     floor, metal = (
         {"pbrMetallicRoughness": {"metallicFactor": factor, "roughnessFactor": rough}}
@@ -203,7 +203,7 @@ def shiny_ball(folder: Path, roughness: float) -> Stage:
     path = folder / "ball.glb"
     scene.write(path)
     panorama = np.full((16, 32, 3), 0.1, np.float32)
-    panorama[4:7, 8:16] = 3.0
+    panorama[4:7, 8:16] = lamp
     _core.save_image(str(folder / "sky.exr"), panorama, ["R", "G", "B"])
     config = {
         "reflector": {"scene_object": "ball"},
@@ -214,19 +214,33 @@ def shiny_ball(folder: Path, roughness: float) -> Stage:
     return prepare_stage(parse_config(config, "scene"))
 
 
-def test_only_a_rough_reflector_gets_samples_for_its_lobe_and_only_it_gets_small_maps(tmp_path: Path) -> None:
+def test_only_a_rough_reflector_gets_small_maps(tmp_path: Path) -> None:
     mirror = analyze(shiny_ball(tmp_path, 0.0))
-    assert mirror.samples == MIRROR_SAMPLES
-    noise = of(mirror, "trace.samples").measured
-    assert noise is not None
-    assert 0.0 < noise < 0.05
     # Perceptual roughness: α is its square.
     rough = analyze(shiny_ball(tmp_path, 0.7))
-    assert MIRROR_SAMPLES < rough.samples <= MOST_SAMPLES
-    assert "ggx" in of(rough, "trace.samples").reason
     width = 4 * math.atan(0.49 * math.sqrt(math.sqrt(2) - 1))
     assert SMALLEST_MAP <= rough.map_size < mirror.map_size
     assert width / 8 <= 2 / rough.map_size <= width / 4 or rough.map_size == SMALLEST_MAP
+
+
+@pytest.mark.parametrize(
+    ("roughness", "lamp", "more"), [(0.0, 3.0, False), (0.3, 0.1, False), (0.7, 8.0, True)]
+)
+def test_first_samples_go_by_the_noise_of_a_rough_lobe(
+    tmp_path: Path, roughness: float, lamp: float, more: bool
+) -> None:
+    decision = of(analyze(shiny_ball(tmp_path, roughness, lamp)), "trace.samples")
+    assert decision.reason.endswith("; noisy pixels get more, by trace.noise")
+    assert decision.measured is not None
+    assert isinstance(decision.value, int)
+    left = decision.measured * math.sqrt(FIRST_SAMPLES / decision.value)
+    if more:
+        assert FIRST_SAMPLES < decision.value <= MOST_FIRST_SAMPLES
+        assert left <= LOBE_NOISE or decision.value == MOST_FIRST_SAMPLES
+        assert left > 0.5 * LOBE_NOISE
+    else:
+        assert decision.value == FIRST_SAMPLES
+        assert roughness == 0.0 or left <= LOBE_NOISE
 
 
 def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
@@ -362,10 +376,10 @@ def test_a_mirror_whose_noise_nothing_mends_gets_more_samples(tmp_path: Path) ->
         return of(analyze(make_stage(tmp_path, RING, trace=trace, auto={"noise": limit})), "trace.samples")
 
     measured = samples(0.0, 0.9).measured
-    assert samples(0.0, 0.9).value == MIRROR_SAMPLES
+    assert samples(0.0, 0.9).value == FIRST_SAMPLES
     assert measured is not None
-    assert samples(0.0, measured / 1.9).value == 4 * MIRROR_SAMPLES
-    assert samples(0.01, measured / 1.9).value == MIRROR_SAMPLES
+    assert samples(0.0, measured / 1.9).value == 4 * FIRST_SAMPLES
+    assert samples(0.01, measured / 1.9).value == FIRST_SAMPLES
 
 
 # What a scene would do without

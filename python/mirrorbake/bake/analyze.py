@@ -11,13 +11,7 @@ import numpy as np
 from mirrorbake.bake.count_parts import parts_decision
 from mirrorbake.bake.distant import distant_decision
 from mirrorbake.bake.map_sizes import map_sizes
-from mirrorbake.bake.probe import (
-    LOBE_PROBE_SAMPLES,
-    Probe,
-    displayed_noise,
-    relative_change,
-    relative_spread,
-)
+from mirrorbake.bake.probe import Probe, displayed_noise, relative_change
 from mirrorbake.bake.quality import QUALITIES, quality_decisions
 from mirrorbake.bake.shell_shapes import planned_shells
 from mirrorbake.bake.spacing import with_spacing
@@ -41,9 +35,14 @@ if TYPE_CHECKING:
 MAX_DEPTH = 16
 """What fewer bounces are compared with."""
 
-MIRROR_SAMPLES = 16
+FIRST_SAMPLES = 16
 MOST_SAMPLES = 256
 """Per pixel; a scene file may set more."""
+MOST_FIRST_SAMPLES = 64
+"""Where `trace.noise` gives noisy pixels more."""
+LOBE_NOISE = 0.03
+"""Of a displayed pixel of a rough reflector, that first samples may leave. Maps of a rough lobe are small and
+meet its light well: what is left is the noise of the views that get no more samples, the static set's."""
 
 _SET = "set in the scene"
 
@@ -144,33 +143,20 @@ def _samples(stage: Stage, depth: int) -> Decision:
     config = stage.config
     if config.trace.samples is not None:
         return Decision("trace.samples", None, config.trace.samples, False, _SET, None)
-    lobes = {material.lobe for material in _materials(stage) if material.specular}
-    if lobes <= {"mirror"}:
-        return _mirror_samples(stage, depth)
-    probe = Probe.of(stage, depth, LOBE_PROBE_SAMPLES)
-    spread = relative_spread(probe.incident, probe.pixel)
-    wanted = max((spread / config.auto.noise) ** 2, 1.0)
-    samples = min(max(2 ** math.ceil(math.log2(wanted)), MIRROR_SAMPLES), MOST_SAMPLES)
-    names = " or ".join(sorted(lobes - {"mirror"}))
-    reason = (
-        f"samples of a pixel differ by {spread:.0%} since each takes one direction of the "
-        f"{names} lobe; {samples} leave a noise of {spread / math.sqrt(samples):.1%}"
-    )
-    return Decision("trace.samples", None, samples, True, reason, spread)
-
-
-def _mirror_samples(stage: Stage, depth: int) -> Decision:
-    config = stage.config
-    noise = displayed_noise(Probe.of(stage, depth, MIRROR_SAMPLES))
-    reason = f"{MIRROR_SAMPLES} leave a noise of {noise:.3f} of the display's range"
+    noise = displayed_noise(Probe.of(stage, depth, FIRST_SAMPLES))
+    reason = f"{FIRST_SAMPLES} leave a noise of {noise:.3f} of the display's range"
     wanted = QUALITIES[config.auto.quality].noise if config.trace.noise is None else config.trace.noise
-    samples = MIRROR_SAMPLES
-    if wanted > 0.0 and config.infer.fit == "display":
+    adaptive = wanted > 0.0 and config.infer.fit == "display"
+    limit, most = config.auto.noise, MOST_SAMPLES
+    if adaptive:
+        rough = any(material.specular and material.lobe != "mirror" for material in _materials(stage))
+        limit, most = LOBE_NOISE if rough else math.inf, MOST_FIRST_SAMPLES
+    samples = FIRST_SAMPLES
+    if noise > limit:
+        samples = min(samples * 2 ** math.ceil(math.log2((noise / limit) ** 2)), most)
+        reason += f", {samples} of {noise * math.sqrt(FIRST_SAMPLES / samples):.3f}"
+    if adaptive:
         reason += "; noisy pixels get more, by trace.noise"
-    elif noise > config.auto.noise:
-        samples *= 2 ** math.ceil(math.log2((noise / config.auto.noise) ** 2))
-        samples = min(samples, MOST_SAMPLES)
-        reason += f", {samples} of {noise * math.sqrt(MIRROR_SAMPLES / samples):.3f}"
     return Decision("trace.samples", None, samples, True, reason, noise)
 
 

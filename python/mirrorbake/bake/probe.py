@@ -25,8 +25,6 @@ PROBE_VIEWS_OF_A_DOME = 9
 PROBE_SIDE = 128
 """Longer side of the trial images, in pixels."""
 PROBE_SAMPLES = 4
-LOBE_PROBE_SAMPLES = 16
-"""Samples per pixel of the trial images that measure a rough lobe's noise."""
 
 BRIGHTEST_SHARE = 0.01
 """The brightest pixels are clipped to the next ones, so that one mirrored sun does not decide alone."""
@@ -130,21 +128,6 @@ def relative_change(with_it: DoubleArray, without: DoubleArray, pixel: NDArray[n
     a, b = np.minimum(a, limit), np.minimum(b, limit)
     scale = float(np.sqrt(np.mean(a * a)))
     return float(np.sqrt(np.mean((a - b) ** 2))) / scale if scale > 0.0 else 0.0
-
-
-def relative_spread(values: DoubleArray, pixel: NDArray[np.int64]) -> float:
-    """Standard deviation of a pixel's samples over the RMS of the pixels, the brightest clipped."""
-    _, place, count = np.unique(pixel, return_inverse=True, return_counts=True)
-    several = count[place] > 1
-    if not several.any():
-        return 0.0
-    clipped = np.minimum(values[several], np.quantile(values[several], 1.0 - BRIGHTEST_SHARE))
-    means = pixel_means(clipped, pixel[several])
-    _, place, count = np.unique(pixel[several], return_inverse=True, return_counts=True)
-    squares = np.sum((clipped - means[place]) ** 2, axis=1)
-    variance = np.bincount(place, weights=squares) / (3.0 * (count - 1))
-    scale = float(np.sqrt(np.mean(means * means)))
-    return float(np.sqrt(np.mean(variance))) / scale if scale > 0.0 else 0.0
 
 
 def displayed_noise(probe: Probe) -> float:

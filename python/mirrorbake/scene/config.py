@@ -243,7 +243,7 @@ class Trace(Section):
     """[trace]: the ray tracer."""
 
     samples: Annotated[Annotated[int, Field(ge=1, le=65536)] | None, *AUTO] = None
-    """Per pixel. "auto": 16, or as many as a rough reflector's lobe needs."""
+    """Per pixel. "auto": 16, or more where those leave too much noise: of a rough lobe, if `noise` is 0."""
     noise: Annotated[Annotated[float, Field(ge=0, lt=1)] | None, *AUTO] = None
     """Standard error of a pixel's displayed value, 0 to 1, above which a pixel gets more than `samples`; 0:
     none does. "auto": by `auto.quality`."""
@@ -283,7 +283,7 @@ class Auto(Section):
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.01
     """Relative RMS change of the object's picture that is worth no layer and no bounce."""
     noise: Annotated[float, Field(gt=0, lt=1)] = 0.05
-    """Relative RMS error of a pixel that the samples of a rough reflector may leave."""
+    """Standard error of a pixel's displayed value, 0 to 1, that samples may leave if `trace.noise` is 0."""
     finer_share: Annotated[float, Field(ge=0, lt=1)] = 0.1
     """Share of the object's pixels whose reflections may be finer than the maps."""
     decibels: Annotated[float, Field(gt=0, le=100)] = 30.0

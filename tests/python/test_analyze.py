@@ -247,14 +247,14 @@ def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
     stage = make_stage(
         tmp_path,
         CONVEX,
-        reflector={"parts": "split"},
+        reflector={"parts": "split", "longest_edge": 0},
         layers={"diffuse": True, "local": True, "hull_split": False},
         maps={"size": 32, "distant": "infinite", "shared_distant": False},
         trace={"depth": 5},
     )
     plan = analyze(stage)
     decided = [decision for decision in plan.decisions if not decision.automatic]
-    expected = ["split", 5, 4, True, True, False, "infinite", False, 32]
+    expected = [0, "split", 5, 4, True, True, False, "infinite", False, 32]
     assert [decision.value for decision in decided] == expected
     assert all(decision.reason == SET for decision in decided)
     # What the quality decides needs no measuring, nor do the shells of [PEM] §4, but for their shapes.

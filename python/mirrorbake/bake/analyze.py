@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from mirrorbake.bake.count_parts import parts_decision
+from mirrorbake.bake.diffuse_edges import edge_decision
 from mirrorbake.bake.distant import distant_decision
 from mirrorbake.bake.map_sizes import map_sizes
 from mirrorbake.bake.probe import Probe, displayed_noise, relative_change
@@ -63,6 +64,10 @@ def analyze(stage: Stage) -> Plan:
     trace = stage.config.trace
     probe = Probe.of(stage, MAX_DEPTH if trace.depth is None else trace.depth)
     depth = _depth(stage, probe)
+    diffuse = _diffuse(stage, probe)
+    edge, stage = edge_decision(stage, has_diffuse=bool(diffuse.value))
+    if edge.automatic and edge.value:
+        probe = Probe.of(stage, cast("int", depth.value))
     parts, labels = parts_decision(stage, probe)
     stage = stage.in_parts(cast("Parts", parts.value))
     if depth.automatic and depth.value != MAX_DEPTH:
@@ -84,10 +89,11 @@ def analyze(stage: Stage) -> Plan:
     planned, geometry = planned_shells(stage, probe, has_local, proxy)
     sizes = map_sizes(stage, planned, hull_split=bool(hull_split.value), shared=bool(shared.value))
     first = [
+        edge,
         parts,
         depth,
         samples,
-        _diffuse(stage, probe),
+        diffuse,
         shells,
         *local,
         hull_split,

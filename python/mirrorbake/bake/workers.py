@@ -66,7 +66,8 @@ def bake_one(place: str, fingerprint: str, index: int, threads: int) -> Counts:
             if store.header.fingerprint != fingerprint:
                 raise StoreError(f"{place}: is not the PEM that this worker was asked to bake")
             config = parse_config(store.header.source.config, place)
-            stage = prepare_stage(config).planned(store.header.plan)
+            plan = store.header.plan
+            stage = prepare_stage(plan.shaped(config)).planned(plan)
             _bakers[key] = (store, SampleBaker(stage, store.contents()))
         return bake_into(*_bakers[key], index)
 

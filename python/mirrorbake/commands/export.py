@@ -241,7 +241,7 @@ def _export_glb(directory: Path, out: Path, sample: int | None, all_samples: boo
     samples = [] if sample is None else [sample]
     if all_samples:
         samples = list(range(len(store.header.space)))
-    built = build_scene(unchanged_config(store))
+    built = build_scene(store.header.plan.shaped(unchanged_config(store)))
     export_glb(store, built, out, samples=samples, report=_print_message)
     _print_message(f"wrote {out}")
 

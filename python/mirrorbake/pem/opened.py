@@ -55,7 +55,8 @@ def open_pem(directory: Location | Path | str, stage: Stage | None = None) -> Op
     store = PemStore.open(directory)
     store.require_complete()
     config = unchanged_config(store)
-    stage = (stage or prepare_stage(config)).planned(store.header.plan)
+    plan = store.header.plan
+    stage = (stage or prepare_stage(plan.shaped(config))).planned(plan)
     store.check_mesh(len(stage.built.positions), len(stage.built.triangles))
     return OpenedPem(store, stage, RunTime(store, stage.built.triangles))
 

@@ -68,6 +68,10 @@ class Reflector(Section):
     cut such that points of a part which reflect alike lie together. "auto": as many as keep apart what the
     views see differently."""
 
+    longest_edge: Annotated[Annotated[float, Field(ge=0, le=1e6)] | None, *AUTO] = None
+    """Of its triangles, metres: longer ones are halved, since the body's own light is stored at the vertices.
+    0: they stay as they are. "auto": if that light would be wrong between them."""
+
     @model_validator(mode="before")
     @classmethod
     def _teapot_by_default(cls, data: Any) -> Any:

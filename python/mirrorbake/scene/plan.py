@@ -185,6 +185,7 @@ class Plan:
         if infer.smoothness is None and weight is not None:
             infer = with_weight(infer, cast("float", weight))
         views = resolved("views", "traced", "around")
+        config = self.shaped(config)
         spaced = {d.key: d.value for d in self.decisions if d.key in ("views.count", "views.rings")}
         if spaced:
             views = views.model_copy(update={key.split(".")[1]: value for key, value in spaced.items()})
@@ -199,6 +200,12 @@ class Plan:
                 "shells": self.shell_sections,
             }
         )
+
+    def shaped(self, config: SceneConfig) -> SceneConfig:
+        """Return the scene with the reflector's mesh as the plan has it."""
+        edge = next((d.value for d in self.decisions if d.key == "reflector.longest_edge"), 0.0)
+        reflector = config.reflector.model_copy(update={"longest_edge": edge})
+        return config.model_copy(update={"reflector": reflector})
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,7 @@ from mirrorbake.errors import InputError
 from mirrorbake.scene.config import ILLUMINANT, MaterialConfig, Reflector, SceneConfig
 from mirrorbake.scene.origin import loaded_nearby
 from mirrorbake.scene.pose import Pose, rotation_matrix
+from mirrorbake.scene.refine import refined
 from mirrorbake.scene.surface_parts import split_surface
 
 if TYPE_CHECKING:
@@ -63,6 +64,9 @@ def add_reflector(config: SceneConfig, scene: _core.Scene, pose: Pose) -> tuple[
     if reflector.scene_object is not None:
         return _scene_reflector(config, scene), []
     source = _source(config, scene)
+    if reflector.longest_edge:
+        limit = reflector.longest_edge / _scale(source.mesh, reflector)
+        source = replace(source, mesh=refined(source.mesh, limit))
     if isinstance(reflector.parts, int):
         source = _cut(source, reflector.parts)
     mesh = _placed(source.mesh, reflector, pose)
@@ -154,7 +158,9 @@ def _placed(mesh: _core.TriangleMesh, reflector: Reflector, pose: Pose) -> _core
     rotation = rotation_matrix(reflector.rotation)
     positions = np.asarray(mesh.positions).astype(np.float64) @ rotation.T
     if reflector.mesh is not None:
-        positions = _stand_on_ground(positions, reflector)
+        low, high = positions.min(axis=0), positions.max(axis=0)
+        base = np.array([0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])])
+        positions = (positions - base) * _scale(mesh, reflector)
     # Rotation and uniform scale leave normals and tangents unit vectors.
     turn = (pose.rotation @ rotation).T
     normals = np.asarray(mesh.normals).astype(np.float64) @ turn
@@ -171,20 +177,20 @@ def _placed(mesh: _core.TriangleMesh, reflector: Reflector, pose: Pose) -> _core
     )
 
 
-def _stand_on_ground(positions: NDArray[np.float64], reflector: Reflector) -> NDArray[np.float64]:
-    low, high = positions.min(axis=0), positions.max(axis=0)
+def _scale(mesh: _core.TriangleMesh, reflector: Reflector) -> float:
+    """Metres of a unit of the mesh."""
+    if reflector.mesh is None:
+        return 1.0
     if reflector.scale is not None:
-        scale = reflector.scale
-    elif high[1] - low[1] > 1e-6 * np.max(high - low):
-        scale = reflector.height / (high[1] - low[1])
-    else:
-        raise InputError(
-            f"{reflector.mesh}: the mesh is flat, so it cannot be scaled to reflector.height; "
-            "turn it with reflector.rotation or give reflector.scale"
-        )
-    base = np.array([0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])])
-    placed: NDArray[np.float64] = (positions - base) * scale
-    return placed
+        return reflector.scale
+    positions = np.asarray(mesh.positions).astype(np.float64) @ rotation_matrix(reflector.rotation).T
+    size = positions.max(axis=0) - positions.min(axis=0)
+    if size[1] > 1e-6 * np.max(size):
+        return float(reflector.height / size[1])
+    raise InputError(
+        f"{reflector.mesh}: the mesh is flat, so it cannot be scaled to reflector.height; "
+        "turn it with reflector.rotation or give reflector.scale"
+    )
 
 
 def _material(config: MaterialConfig, scene: _core.Scene) -> int:

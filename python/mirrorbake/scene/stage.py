@@ -30,6 +30,8 @@ class Stage:
     """The last stage that `at` made, by the coordinates that change the scene."""
     cut: dict[Parts, Stage] = field(default_factory=dict, compare=False, repr=False)
     """The last stage that `in_parts` made, by the parts of the reflector."""
+    finer: dict[float, Stage] = field(default_factory=dict, compare=False, repr=False)
+    """The last stage that `without_edges_above` made, by the longest edge."""
     place: Mapping[str, float] = field(default_factory=dict)
     """Coordinates that have changed the scene, by axis; without any it is at rest."""
 
@@ -65,7 +67,8 @@ class Stage:
         """Return the stage with what a plan decides in place of "auto", so that its views can be traced."""
         config = plan.resolve(self.config)
         assert config.reflector.parts is not None, "a plan decides the parts"
-        stage = replace(self.in_parts(config.reflector.parts), config=config)
+        stage = self.without_edges_above(config.reflector.longest_edge or 0.0)
+        stage = replace(stage.in_parts(config.reflector.parts), config=config)
         return stage.spaced(config) if self.config.views.awaits_spacing else stage
 
     def spaced(self, config: SceneConfig) -> Stage:
@@ -77,7 +80,18 @@ class Stage:
             One of its views lies inside the reflector.
         """
         built = self.built.with_space(space_of(config))
-        return replace(self, config=config, built=built, moved={}, cut={})
+        return replace(self, config=config, built=built, moved={}, cut={}, finer={})
+
+    def without_edges_above(self, edge: float) -> Stage:
+        """Return the stage with a finer mesh of its reflector (`reflector.longest_edge`); 0: as it is."""
+        before = self.config.reflector.longest_edge
+        if edge == (before or 0.0):
+            return self
+        if edge not in self.finer:
+            reflector = self.config.reflector.model_copy(update={"longest_edge": edge})
+            self.finer.clear()
+            self.finer[edge] = prepare_stage(self.config.model_copy(update={"reflector": reflector}))
+        return self.finer[edge]
 
     def in_parts(self, parts: Parts) -> Stage:
         """Return the stage with its reflector in other parts (`reflector.parts`)."""

@@ -228,7 +228,14 @@ def shrunk(config: SceneConfig, longest_side: int) -> SceneConfig:
 
 
 _DECIDED = (
-    *("reflector.parts", "trace.depth", "trace.samples", "trace.noise", "maps.distant"),
+    *(
+        "reflector.longest_edge",
+        "reflector.parts",
+        "trace.depth",
+        "trace.samples",
+        "trace.noise",
+        "maps.distant",
+    ),
     "maps.shared_distant",
     *("views.traced", "views.around", "infer.passes", "infer.neighbours"),
 )
@@ -257,6 +264,7 @@ def _studied(config: SceneConfig) -> Stage:
     local = {decision.value for decision in plan.decisions if decision.key == "layers.local"}
     if len(local) == 1:
         decided["layers.local"] = local.pop()
+    stage = stage.without_edges_above(cast("float", plan.value("reflector.longest_edge")))
     stage = stage.in_parts(cast("Parts", plan.value("reflector.parts")))
     return replace(stage, config=overridden(config, decided))
 

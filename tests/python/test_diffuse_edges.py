@@ -1,0 +1,231 @@
+"""Light that is stored at vertices: meshes get finer where it would be wrong between them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from mirrorbake import _core
+from mirrorbake.bake.analyze import analyze
+from mirrorbake.bake.bake import bake
+from mirrorbake.errors import InputError
+from mirrorbake.evaluate.metrics import psnr
+from mirrorbake.pem.opened import open_pem
+from mirrorbake.pem.view_images import images_of_trace
+from mirrorbake.scene import refine
+from mirrorbake.scene.build import build_scene
+from mirrorbake.scene.load import parse_config
+from mirrorbake.scene.refine import refined
+from mirrorbake.scene.stage import prepare_stage
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from mirrorbake.scene.plan import Decision, Plan
+
+    Box = tuple[Sequence[float], Sequence[float]]
+
+FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+PLATE: Box = ((-1.0, 0.0, -1.0), (1.0, 0.1, 1.0))
+POST: Box = ((-0.1, 0.1, -0.1), (0.1, 1.0, 0.1))
+
+
+def corners_of(box: Box) -> np.ndarray:
+    (x0, y0, z0), (x1, y1, z1) = box
+    low = [(x0, y0, z0), (x1, y0, z0), (x1, y1, z0), (x0, y1, z0)]
+    return np.array([*low, *((x, y, z1) for x, y, _ in low)], np.float32)
+
+
+def cube(*, normals: bool) -> _core.TriangleMesh:
+    """A cube of two parts whose faces have normals and vertices of their own, or share eight."""
+    quads = np.array(FACES)
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    places, parts = corners_of(((0, 0, 0), (1, 1, 1))), np.tile(np.array([0, 0, 0, 1, 1, 1], np.uint16), 2)
+    if not normals:
+        return _core.TriangleMesh(places, triangles.astype(np.uint32), parts=parts)
+    corners = places[triangles]
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    positions = corners.reshape(-1, 3)
+    return _core.TriangleMesh(
+        positions,
+        np.arange(36, dtype=np.uint32).reshape(-1, 3),
+        np.repeat(facing, 3, axis=0).astype(np.float32),
+        np.ascontiguousarray(positions[:, :2] + 2.0 * positions[:, 2:]),
+        parts,
+        np.ascontiguousarray(0.5 * positions),
+        np.concatenate([np.roll(np.repeat(facing, 3, axis=0), 1, axis=1), np.ones((36, 1))], axis=1).astype(
+            np.float32
+        ),
+    )
+
+
+def edges_of(mesh: _core.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of numbers of places, each edge in the direction in which its triangle has it, and lengths."""
+    _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
+    ends = np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    lengths = np.linalg.norm(mesh.positions[ends[:, 1]] - mesh.positions[ends[:, 0]], axis=1)
+    return place.reshape(-1)[ends], lengths
+
+
+def areas_of(mesh: _core.TriangleMesh) -> np.ndarray:
+    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    return np.cross(b - a, c - a) / 2.0
+
+
+@pytest.mark.parametrize("normals", [True, False])
+@pytest.mark.parametrize("limit", [2.0, 1.2, 0.8, 0.3, 0.1])
+def test_a_finer_cube_is_as_closed_and_has_no_longer_edges(normals: bool, limit: float) -> None:
+    mesh = cube(normals=normals)
+    finer = refined(mesh, limit)
+    ends, lengths = edges_of(finer)
+    assert lengths.max() <= limit
+    # Every edge is there once in each direction: what lies on both sides of it is cut alike.
+    directed = {tuple(pair) for pair in ends.tolist()}
+    assert len(directed) == len(ends)
+    assert all((b, a) in directed for a, b in directed)
+    areas = areas_of(finer)
+    assert np.linalg.norm(areas, axis=1).sum() == pytest.approx(6.0, rel=1e-6)
+    assert np.bincount(finer.parts, np.linalg.norm(areas, axis=1)).tolist() == pytest.approx([3.0, 3.0])
+    np.testing.assert_allclose(np.sort(areas.sum(axis=0)), 0.0, atol=1e-6)
+    if limit > 1.5:
+        assert len(finer.triangles) == 12
+
+
+def test_values_of_new_vertices_are_those_of_the_surface_there() -> None:
+    finer = refined(cube(normals=True), 0.15)
+    np.testing.assert_allclose(finer.uvs, finer.positions[:, :2] + 2.0 * finer.positions[:, 2:], atol=1e-6)
+    np.testing.assert_allclose(finer.colors, 0.5 * finer.positions, atol=1e-6)
+    units = np.repeat(areas_of(finer) / np.linalg.norm(areas_of(finer), axis=1, keepdims=True), 3, axis=0)
+    np.testing.assert_allclose(finer.normals[finer.triangles.reshape(-1)], units, atol=1e-6)
+    np.testing.assert_allclose(finer.tangents[:, :3], np.roll(finer.normals, 1, axis=1), atol=1e-6)
+    assert np.all(finer.tangents[:, 3] == 1.0)
+
+
+def test_normals_between_others_are_unit_and_tangents_of_mirrored_halves_meet_in_none() -> None:
+    triangle = _core.TriangleMesh(
+        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32),
+        np.array([[0, 1, 2]], np.uint32),
+        np.array([[0, 0, 1], [1, 0, 0], [0, 0, -1]], np.float32),
+        tangents=np.array([[1, 0, 0, 1], [0, 1, 0, -1], [0, 1, 0, 1]], np.float32),
+    )
+    finer = refined(triangle, 0.8)
+    assert len(finer.triangles) == 4
+    np.testing.assert_allclose(np.linalg.norm(finer.normals, axis=1), 1.0, atol=1e-6)
+    middle = {tuple(place): n for n, place in enumerate(finer.positions.tolist())}
+    np.testing.assert_allclose(finer.normals[middle[0.5, 0.0, 0.0]], [0.5**0.5, 0, 0.5**0.5], atol=1e-6)
+    # Opposite normals have no mean: the first's.
+    np.testing.assert_allclose(finer.normals[middle[0.0, 0.5, 0.0]], [0, 0, 1], atol=1e-6)
+    assert not finer.tangents[middle[0.5, 0.0, 0.0]].any()
+    np.testing.assert_allclose(finer.tangents[middle[0.0, 0.5, 0.0]], [0.5**0.5, 0.5**0.5, 0, 1], atol=1e-6)
+
+
+def test_without_normals_triangles_share_vertices_in_one_plane_only() -> None:
+    finer = refined(cube(normals=False), 0.6)
+    assert not len(finer.normals)
+    facing = np.argmax(np.abs(areas_of(finer)), axis=1) + 3 * (areas_of(finer).sum(axis=1) > 0.0)
+    for vertex in range(len(finer.positions)):
+        assert len(set(facing[(finer.triangles == vertex).any(axis=1)].tolist())) == 1
+
+
+def test_edges_that_are_too_short_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(refine, "MOST_TRIANGLES", 1000)
+    with pytest.raises(InputError, match=r"reflector.longest_edge: 0\.01 .* or more; expected at most 1000"):
+        refined(cube(normals=True), 0.01)
+
+
+# In a scene
+
+
+def coated(folder: Path, boxes: Sequence[Box], **sections: dict[str, Any]) -> dict[str, Any]:
+    """Boxes of one mesh in plastic, under a small sun."""
+    lines, faces = [], []
+    for number, box in enumerate(boxes):
+        lines += [f"v {x} {y} {z}" for x, y, z in corners_of(box).tolist()]
+        faces += [
+            "f " + " ".join(f"{corner + 8 * number + 1}//{side + 1}" for corner in quad)
+            for side, quad in enumerate(FACES)
+        ]
+    normals = ("0 0 -1", "0 0 1", "0 -1 0", "1 0 0", "0 1 0", "-1 0 0")
+    path = folder / f"boxes-{len(boxes)}.obj"
+    path.write_text("\n".join([*lines, *(f"vn {normal}" for normal in normals), *faces]) + "\n")
+    sky = np.full((32, 64, 3), 0.3, np.float32)
+    sky[8:10, 20:22] = 120.0
+    _core.save_image(str(folder / "sky.exr"), sky, ["R", "G", "B"], format="float32")
+    scene: dict[str, dict[str, Any]] = {
+        "reflector": {"mesh": str(path), "height": 1.0, "parts": "joined"},
+        "material": {
+            "ior": [1.5] * 3,
+            "fresnel": "dielectric",
+            "albedo": [0.7, 0.6, 0.5],
+            "layers": "coated",
+        },
+        "surroundings": {"panorama": str(folder / "sky.exr")},
+        "views": {"count": 2, "start": 20.0, "degrees": 2.0, "size": [80, 80]},
+        "trace": {"indirect": "none", "samples": 16, "noise": 0, "depth": 0},
+        "maps": {"size": 8},
+        "static": {"views": 0},
+    }
+    for name, section in sections.items():
+        scene[name] = {**scene[name], **section}
+    return scene
+
+
+def edge_of(plan: Plan) -> Decision:
+    (decision,) = (decision for decision in plan.decisions if decision.key == "reflector.longest_edge")
+    return decision
+
+
+def test_a_shadow_on_a_large_triangle_makes_the_mesh_finer(tmp_path: Path) -> None:
+    decibels, sizes = {}, {}
+    for edge in (0, "auto"):
+        scene = coated(tmp_path, [PLATE, POST], reflector={"longest_edge": edge})
+        bake(parse_config(scene, "plate"), tmp_path / str(edge))
+        pem = open_pem(tmp_path / str(edge))
+        sizes[edge] = len(pem.stage.built.positions)
+        options = pem.stage.options
+        options.samples_per_pixel, options.seed = 256, 7
+        camera = pem.stage.built.cameras.camera((0.0,))
+        truth = images_of_trace(pem.stage.tracer.trace_layers(camera, pem.stage.built.reflector, options))
+        drawn = pem.run_time.render("pem", 0.0, pem.stage.visibility(0.0, pem.run_time.places))
+        decibels[edge] = psnr(drawn, truth.object, truth.coverage > 0.999)
+        decision = edge_of(pem.store.header.plan)
+        assert decision.automatic == (edge == "auto")
+    assert sizes[0] == 48
+    assert 300 < sizes["auto"] < 20_000
+    assert "beyond noise" in decision.reason
+    assert decibels["auto"] > decibels[0] + 6.0
+    # What was baked is opened and exported with the mesh that it was baked for.
+    built = build_scene(pem.store.header.plan.shaped(parse_config(scene, "plate")))
+    assert len(built.positions) == sizes["auto"]
+
+
+@pytest.mark.parametrize(
+    ("boxes", "sections", "reason"),
+    [
+        ([PLATE], {}, "changes the picture by 0"),
+        (
+            [PLATE, POST],
+            {"material": {"albedo": [0, 0, 0], "layers": "additive"}},
+            "there is no diffuse layer",
+        ),
+        ([PLATE, POST], {"reflector": {"longest_edge": 0.05}}, "set in the scene"),
+    ],
+)
+def test_the_mesh_stays_as_it_is_where_that_changes_nothing(
+    tmp_path: Path, boxes: list[Box], sections: dict[str, Any], reason: str
+) -> None:
+    stage = prepare_stage(parse_config(coated(tmp_path, boxes, **sections), "plate"))
+    decision = edge_of(analyze(stage))
+    assert reason in decision.reason
+    assert decision.value == (0.05 if "set" in reason else 0.0)
+
+
+def test_fine_meshes_are_not_measured(tmp_path: Path) -> None:
+    scene = coated(tmp_path, [PLATE])
+    scene["reflector"] = {"object": "teapot"}
+    decision = edge_of(analyze(prepare_stage(parse_config(scene, "teapot"))))
+    assert (decision.value, decision.measured) == (0.0, None)
+    assert decision.reason == "triangles are small in the picture"

@@ -7,7 +7,7 @@ import json
 import struct
 import subprocess
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jsonschema
 import numpy as np
@@ -15,19 +15,23 @@ import pytest
 from PIL import Image
 
 from mirrorbake import _core
+from mirrorbake.bake import count_parts
 from mirrorbake.bake.bake import bake
 from mirrorbake.errors import InputError, OptionError
 from mirrorbake.pem.export.glb import export_glb
 from mirrorbake.pem.export.glb_file import GlbFile
 from mirrorbake.pem.export.gltf_material import add_textures, gltf_material
 from mirrorbake.pem.export.mesh_file import has_border
+from mirrorbake.pem.opened import built_scene
 from mirrorbake.pem.store import PemStore
-from mirrorbake.scene.build import BuiltScene, build_scene
 from mirrorbake.scene.load import parse_config
 from viewer_cases import case_scene, cases
 from web_tools import node_folder
 
 from .gltf_scene import pair_of_primitives
+
+if TYPE_CHECKING:
+    from mirrorbake.scene.build import BuiltScene
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = json.loads((ROOT / "docs" / "reference" / "EXT_mirrorbake_pem.schema.json").read_text())
@@ -86,7 +90,8 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> tuple[PemStore, BuiltScen
     directory = tmp_path_factory.mktemp("glb") / "pem"
     config = parse_config(SMALL, "small")
     bake(config, directory)
-    return PemStore.open(directory), build_scene(config)
+    store = PemStore.open(directory)
+    return store, built_scene(store)
 
 
 @pytest.fixture(scope="module")
@@ -136,6 +141,23 @@ def test_the_extension_is_as_its_schema_says(glb: Glb) -> None:
     broken = {**glb.extension, "sets": []}
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(broken, SCHEMA)
+
+
+def test_parts_that_the_plan_has_cut_are_all_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(count_parts, "TOLERANCE", 0.0)
+    monkeypatch.setattr(count_parts, "WORTH", 0.01)
+    reflector = {"object": "teapot", "subdivisions": 8, "parts": "auto"}
+    config = {**SMALL, "reflector": reflector, "layers": {"diffuse": False}}
+    bake(parse_config(config, "parts"), tmp_path / "pem")
+    store = PemStore.open(tmp_path / "pem")
+    count = len(store.header.parts)
+    assert count > 2
+    built = built_scene(store)
+    export_glb(store, built, tmp_path / "parts.glb")
+    glb = Glb((tmp_path / "parts.glb").read_bytes())
+    parts = [primitive["extensions"]["EXT_mirrorbake_pem"]["part"] for primitive in glb.primitives]
+    assert sorted(parts) == list(range(count))
+    assert sum(len(glb.accessor(p["indices"])) for p in glb.primitives) == 3 * len(built.triangles)
 
 
 def test_the_mesh_is_the_reflector(glb: Glb, baked: tuple[PemStore, BuiltScene]) -> None:
@@ -323,7 +345,8 @@ def test_every_part_has_its_own_material_and_the_static_set_is_the_pems(tmp_path
         "two",
     )
     bake(config, tmp_path / "pem")
-    store, built = PemStore.open(tmp_path / "pem"), build_scene(config)
+    store = PemStore.open(tmp_path / "pem")
+    built = built_scene(store)
     export_glb(store, built, tmp_path / "two.glb")
     glb = Glb((tmp_path / "two.glb").read_bytes())
     assert [material["name"] for material in glb.json["materials"]] == ["gold", "cloth"]
@@ -361,7 +384,8 @@ def test_primitives_with_a_normal_texture_keep_their_tangents(tmp_path: Path) ->
         "pair",
     )
     bake(config, tmp_path / "pem")
-    export_glb(PemStore.open(tmp_path / "pem"), build_scene(config), tmp_path / "pair.glb")
+    store = PemStore.open(tmp_path / "pem")
+    export_glb(store, built_scene(store), tmp_path / "pair.glb")
     glb = Glb((tmp_path / "pair.glb").read_bytes())
     by_material = {glb.json["materials"][p["material"]]["name"]: p for p in glb.primitives}
     assert "TANGENT" not in by_material["gold"]["attributes"]
@@ -399,7 +423,8 @@ def test_a_bowl_of_dual_paraboloids_keeps_them_and_the_light_on_its_backs(tmp_pa
         "bowl",
     )
     bake(config, tmp_path / "pem")
-    store, built = PemStore.open(tmp_path / "pem"), build_scene(config)
+    store = PemStore.open(tmp_path / "pem")
+    built = built_scene(store)
     export_glb(store, built, tmp_path / "bowl.glb", samples=[0])
     glb = Glb((tmp_path / "bowl.glb").read_bytes())
     jsonschema.validate(glb.extension, SCHEMA)

@@ -81,6 +81,7 @@ def edge_decision(stage: Stage, *, has_diffuse: bool) -> tuple[Decision, Stage]:
     mesh = stage.built.scene.object_mesh(stage.built.reflector)
     while edge < coarse and len(refined(mesh, edge).positions) > MOST_VERTICES:
         edge *= math.sqrt(2.0)
+    edge = float(f"{edge:.3g}")
     finer = stage.without_edges_above(edge)
     after = change_by(finer, views, at_vertices(finer))
     if after > 0.8 * before:

@@ -231,9 +231,8 @@ def _export_maps(
 def _export_glb(directory: Path, out: Path, sample: int | None, all_samples: bool) -> None:
     from mirrorbake.files import check_writable
     from mirrorbake.pem.export.glb import export_glb
-    from mirrorbake.pem.opened import unchanged_config
+    from mirrorbake.pem.opened import built_scene
     from mirrorbake.pem.store import PemStore
-    from mirrorbake.scene.build import build_scene
 
     check_writable(out)
     store = PemStore.open(directory)
@@ -241,8 +240,7 @@ def _export_glb(directory: Path, out: Path, sample: int | None, all_samples: boo
     samples = [] if sample is None else [sample]
     if all_samples:
         samples = list(range(len(store.header.space)))
-    built = build_scene(store.header.plan.shaped(unchanged_config(store)))
-    export_glb(store, built, out, samples=samples, report=_print_message)
+    export_glb(store, built_scene(store), out, samples=samples, report=_print_message)
     _print_message(f"wrote {out}")
 
 

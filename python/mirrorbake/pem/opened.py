@@ -9,6 +9,7 @@ from mirrorbake.errors import StoreError
 from mirrorbake.pem.header import Source
 from mirrorbake.pem.run_time import RunTime
 from mirrorbake.pem.store import PemStore
+from mirrorbake.scene.build import BuiltScene, build_scene
 from mirrorbake.scene.inputs import hash_inputs
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.stage import Stage, prepare_stage
@@ -59,6 +60,13 @@ def open_pem(directory: Location | Path | str, stage: Stage | None = None) -> Op
     stage = (stage or prepare_stage(plan.shaped(config))).planned(plan)
     store.check_mesh(len(stage.built.positions), len(stage.built.triangles))
     return OpenedPem(store, stage, RunTime(store, stage.built.triangles))
+
+
+def built_scene(store: PemStore) -> BuiltScene:
+    """Build the scene of a complete PEM as it was baked, without a ray tracer; raises as `open_pem` does."""
+    built = build_scene(store.header.plan.shaped(unchanged_config(store)))
+    store.check_mesh(len(built.positions), len(built.triangles))
+    return built
 
 
 def unchanged_config(store: PemStore) -> SceneConfig:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mirrorbake.scene.config_infer import Infer
 
 DECIDED_KEYS = (
+    "reflector.longest_edge",
     "reflector.parts",
     "trace.depth",
     "trace.samples",
@@ -191,7 +192,6 @@ class Plan:
             views = views.model_copy(update={key.split(".")[1]: value for key, value in spaced.items()})
         return config.model_copy(
             update={
-                "reflector": resolved("reflector", "parts"),
                 "maps": resolved("maps", "shared_distant"),
                 "trace": resolved("trace", "samples", "noise", "depth"),
                 "views": views,
@@ -202,9 +202,10 @@ class Plan:
         )
 
     def shaped(self, config: SceneConfig) -> SceneConfig:
-        """Return the scene with the reflector's mesh as the plan has it."""
+        """Return the scene with the reflector's mesh, and its parts, as the plan has them."""
         edge = next((d.value for d in self.decisions if d.key == "reflector.longest_edge"), 0.0)
-        reflector = config.reflector.model_copy(update={"longest_edge": edge})
+        shape = {"longest_edge": edge, "parts": self.value("reflector.parts")}
+        reflector = config.reflector.model_copy(update=shape)
         return config.model_copy(update={"reflector": reflector})
 
     def to_dict(self) -> dict[str, Any]:
@@ -227,7 +228,8 @@ class Plan:
             tuple(data["advice"]),
             SpacingLaw.from_dict(data["law"]) if "law" in data else None,
         )
-        for key in DECIDED_KEYS:
+        # Without a decision on its edges the mesh is as its file has it.
+        for key in DECIDED_KEYS[1:]:
             if all(decision.key != key for decision in plan.decisions):
                 raise KeyError(key)
         return plan

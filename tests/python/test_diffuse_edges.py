@@ -132,8 +132,8 @@ def test_without_normals_triangles_share_vertices_in_one_plane_only() -> None:
 
 def test_edges_that_are_too_short_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(refine, "MOST_TRIANGLES", 1000)
-    with pytest.raises(InputError, match=r"reflector.longest_edge: 0\.01 .* or more; expected at most 1000"):
-        refined(cube(normals=True), 0.01)
+    with pytest.raises(InputError, match=r"reflector.longest_edge: 0\.02 .* or more; expected at most 1000"):
+        refined(cube(normals=True), 0.02, 2.0)
 
 
 # In a scene

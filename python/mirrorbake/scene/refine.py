@@ -18,7 +18,7 @@ SAME_PLANE = 1e-3
 """How far apart, in radians, triangles of a flat face may be."""
 
 
-def refined(mesh: _core.TriangleMesh, longest_edge: float) -> _core.TriangleMesh:
+def refined(mesh: _core.TriangleMesh, longest_edge: float, scale: float = 1.0) -> _core.TriangleMesh:
     """Return a mesh of the same surface without edges longer than a limit.
 
     Edges are halved, on both sides alike, until none is too long: the surface stays as closed as it was, also
@@ -31,7 +31,9 @@ def refined(mesh: _core.TriangleMesh, longest_edge: float) -> _core.TriangleMesh
     mesh
         Any.
     longest_edge
-        In the mesh's units, above 0.
+        Metres, above 0.
+    scale
+        Metres of a unit of the mesh.
 
     Raises
     ------
@@ -49,15 +51,15 @@ def refined(mesh: _core.TriangleMesh, longest_edge: float) -> _core.TriangleMesh
         if len(values := getattr(mesh, name))
     }
     while True:
-        is_long = _lengths(positions, triangles) > longest_edge
+        is_long = scale * _lengths(positions, triangles) > longest_edge
         if not is_long.any():
             break
         # Each halved edge is one triangle more.
         count = len(triangles) + int(is_long.sum())
         if count > MOST_TRIANGLES:
             raise InputError(
-                f"reflector.longest_edge: {longest_edge:.3g} in the mesh's units makes {count} triangles or "
-                f"more; expected at most {MOST_TRIANGLES}"
+                f"reflector.longest_edge: {longest_edge:g} makes {count} triangles or more; "
+                f"expected at most {MOST_TRIANGLES}"
             )
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)[is_long]
         pairs, place = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)

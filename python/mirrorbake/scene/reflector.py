@@ -65,8 +65,8 @@ def add_reflector(config: SceneConfig, scene: _core.Scene, pose: Pose) -> tuple[
         return _scene_reflector(config, scene), []
     source = _source(config, scene)
     if reflector.longest_edge:
-        limit = reflector.longest_edge / _scale(source.mesh, reflector)
-        source = replace(source, mesh=refined(source.mesh, limit))
+        finer = refined(source.mesh, reflector.longest_edge, _scale(source.mesh, reflector))
+        source = replace(source, mesh=finer)
     if isinstance(reflector.parts, int):
         source = _cut(source, reflector.parts)
     mesh = _placed(source.mesh, reflector, pose)

@@ -43,6 +43,12 @@ def test_a_map_of_constant_light_is_constant() -> None:
     np.testing.assert_allclose(diffuse._bilinear(np.array([[1 / 16, 1 / 16]]), 8).toarray()[0, :2], [1, 0])
 
 
+def test_a_black_body_is_refused() -> None:
+    black = {**TEAPOT, "material": {"metal": "silver"}}
+    with pytest.raises(InputError, match=r"material\.albedo: black"):
+        next(iter(diffuse.ways_to_store(parse_config(black, "teapot"))))
+
+
 def test_the_command_refuses_objects_of_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text('[reflector]\nscene_object = "ball"\n[surroundings]\nscene = "scene.glb"\n')

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.bake.probe import BRIGHTEST_SHARE, PROBE_SIDE, probe_points
+from mirrorbake.bake.probe import BRIGHTEST_SHARE, probe_points, small_cameras
 from mirrorbake.bake.sample import diffuse_layer, lit_sides
 from mirrorbake.pem.run_time import diffuse_of
 from mirrorbake.scene.plan import Decision
@@ -93,10 +92,7 @@ def edge_decision(stage: Stage, *, has_diffuse: bool) -> tuple[Decision, Stage]:
 
 def small_views(stage: Stage) -> list[_core.Camera]:
     """Return a few views of a stage as small pictures."""
-    cameras = stage.built.cameras
-    width, height = cameras.size
-    scale = min(1.0, PROBE_SIDE / max(width, height))
-    small = replace(cameras, size=(max(1, round(scale * width)), max(1, round(scale * height))))
+    small = small_cameras(stage.built.cameras)
     return [small.camera(point) for point in probe_points(stage)]
 
 

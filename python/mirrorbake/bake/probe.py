@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.scene.cameras import Cameras
     from mirrorbake.scene.parameters import Point
     from mirrorbake.scene.stage import Stage
 
@@ -28,6 +29,13 @@ PROBE_SAMPLES = 4
 
 BRIGHTEST_SHARE = 0.01
 """The brightest pixels are clipped to the next ones, so that one mirrored sun does not decide alone."""
+
+
+def small_cameras(cameras: Cameras) -> Cameras:
+    """Return cameras for trial images, no longer than `PROBE_SIDE`."""
+    width, height = cameras.size
+    scale = min(1.0, PROBE_SIDE / max(width, height))
+    return replace(cameras, size=(max(1, round(scale * width)), max(1, round(scale * height))))
 
 
 def probe_points(stage: Stage) -> list[Point]:
@@ -56,9 +64,7 @@ class Probe:
 
     @staticmethod
     def of(stage: Stage, depth: int, samples_per_pixel: int = PROBE_SAMPLES) -> Probe:
-        width, height = stage.built.cameras.size
-        scale = min(1.0, PROBE_SIDE / max(width, height))
-        size = (max(1, round(scale * width)), max(1, round(scale * height)))
+        size = small_cameras(stage.built.cameras).size
         # The same random numbers at every depth: what differs are the bounces alone.
         options = _core.TraceOptions(
             samples_per_pixel=samples_per_pixel,
@@ -68,7 +74,7 @@ class Probe:
         )
         traces = [
             moved.tracer.trace_layers(
-                replace(moved.built.cameras, size=size).camera(point), moved.built.reflector, options
+                small_cameras(moved.built.cameras).camera(point), moved.built.reflector, options
             )
             for moved, point in ((stage.at(point), point) for point in probe_points(stage))
         ]

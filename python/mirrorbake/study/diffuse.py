@@ -55,10 +55,21 @@ class Storage:
 
 
 def ways_to_store(config: SceneConfig) -> Iterator[Storage]:
-    """Measure vertices of finer and finer meshes, then maps, if the mesh has coordinates for them."""
+    """Measure vertices of finer and finer meshes, then maps, if the mesh has coordinates for them.
+
+    Raises
+    ------
+    InputError
+        No part of the object has diffuse light, or the object is one of a scene, which keeps its mesh.
+    """
+    if config.reflector.scene_object is not None:
+        raise InputError("reflector.scene_object: keeps its mesh; expected `mesh` or `object`")
     stage = prepare_stage(config)
-    views = small_views(stage)
     built = stage.built
+    materials = map(built.scene.material, built.scene.object_part_materials(built.reflector))
+    if not any(any(material.albedo) or any(material.emission) for material in materials):
+        raise InputError("material.albedo: black, so that there is no diffuse light to store")
+    views = small_views(stage)
     corners = built.positions[built.triangles].astype(np.float64)
     edge = float(np.mean(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1)))
     finest = stage
@@ -73,13 +84,16 @@ def ways_to_store(config: SceneConfig) -> Iterator[Storage]:
         yield Storage(name, len(finer.built.positions), change_by(finer, views, at_vertices(finer)))
     coordinates = np.asarray(built.scene.object_mesh(built.reflector).uvs)
     if len(coordinates):
+        light = diffuse_layer(finest, 1)
         for size in SIZES:
-            drawn, texels = in_map(finest, size)
+            drawn, texels = in_map(finest, light, size)
             yield Storage(f"map of {size}²", texels, change_by(finest, views, drawn))
 
 
-def in_map(stage: Stage, size: int) -> tuple[Callable[[_core.SurfaceSamples], FloatArray], int]:
-    """Fit a map on the mesh's texture coordinates to the light at its vertices.
+def in_map(
+    stage: Stage, light: FloatArray, size: int
+) -> tuple[Callable[[_core.SurfaceSamples], FloatArray], int]:
+    """Fit a map on the mesh's texture coordinates to the light (V, 3) at its vertices.
 
     Returns
     -------
@@ -90,7 +104,6 @@ def in_map(stage: Stage, size: int) -> tuple[Callable[[_core.SurfaceSamples], Fl
     mesh = built.scene.object_mesh(built.reflector)
     uvs, triangles = np.asarray(mesh.uvs), np.asarray(mesh.triangles)
     reads = _bilinear(uvs, size)
-    light = diffuse_layer(stage, 1).astype(np.float64)
     across = scipy.sparse.eye_array(size * size) - scipy.sparse.eye_array(size * size, k=1)
     down = scipy.sparse.eye_array(size * size) - scipy.sparse.eye_array(size * size, k=size)
     system = scipy.sparse.vstack([reads, SMOOTHNESS**0.5 * across, SMOOTHNESS**0.5 * down]).tocsr()
@@ -132,12 +145,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="assignments")
     options = parser.parse_args(arguments)
     overrides = [parse_override(text) for text in options.assignments]
+    scenes = {name: load_config(Path(name), overrides) for name in options.scenes}
     print("| scene | stored | values | bytes | change |")
     print("| --- | --- | --- | --- | --- |")
-    for name in options.scenes:
-        config = load_config(Path(name), overrides)
-        if config.reflector.scene_object is not None:
-            raise InputError(f"{name}: reflector.scene_object keeps its mesh; expected `mesh` or `object`")
+    for name, config in scenes.items():
         for way in ways_to_store(config):
             size = f"{BYTES * way.values / 1e3:.1f} kB"
             print(

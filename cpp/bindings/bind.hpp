@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <initializer_list>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +26,20 @@ using FloatMatrix = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::devi
 using FloatImage = nb::ndarray<const float, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using ByteArray = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using PointArray = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using UvArray = nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using TriangleArray = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+/// Views into an array's memory.
+inline std::span<const glm::vec3> points(const PointArray& array) {
+  static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
+  return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
+}
+inline std::span<const glm::vec2> pairs(const UvArray& array) {
+  return {reinterpret_cast<const glm::vec2*>(array.data()), array.shape(0)};
+}
+inline std::span<const glm::uvec3> indices(const TriangleArray& array) {
+  return {reinterpret_cast<const glm::uvec3*>(array.data()), array.shape(0)};
+}
 
 /// A NumPy array that owns the vector's memory.
 template <typename T>

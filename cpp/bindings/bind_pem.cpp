@@ -24,10 +24,6 @@ struct OwnedShellMap {
   }
 };
 
-std::span<const glm::vec3> points(const PointArray& array) {
-  return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
-}
-
 void bind_shell_map(nb::module_& m) {
   nb::class_<OwnedShellMap>(m, "ShellMap", "The map of one shell, as a part of the reflector reads it.")
       .def(
@@ -112,15 +108,13 @@ yet times F, and alpha, which is 0 where the shell leaves the sample's triangle 
 
   m.def(
       "diffuse_from_irradiance",
-      [](const SurfaceSamples& samples,
-         nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu> triangles,
-         PointArray irradiance, const std::optional<PointArray>& back) {
+      [](const SurfaceSamples& samples, TriangleArray triangles, PointArray irradiance,
+         const std::optional<PointArray>& back) {
         std::vector<glm::vec3> diffuse;
         {
           const nb::gil_scoped_release unlocked;
-          diffuse = diffuse_from_irradiance(
-              samples, {reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0)},
-              points(irradiance), back ? points(*back) : std::span<const glm::vec3>());
+          diffuse = diffuse_from_irradiance(samples, indices(triangles), points(irradiance),
+                                            back ? points(*back) : std::span<const glm::vec3>());
         }
         return vectors_to_numpy(std::move(diffuse));
       },
@@ -128,6 +122,23 @@ yet times F, and alpha, which is 0 where the shell leaves the sample's triangle 
       nb::arg("back_irradiance") = nb::none(),
       R"(Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex
 (V, 3). Samples that see the back of a triangle take that of `back_irradiance`, if it is given.)");
+
+  m.def(
+      "diffuse_from_lightmap",
+      [](const SurfaceSamples& samples, TriangleArray triangles, UvArray uvs, int size, PointArray lightmap,
+         const std::optional<PointArray>& back) {
+        std::vector<glm::vec3> diffuse;
+        {
+          const nb::gil_scoped_release unlocked;
+          diffuse = diffuse_from_lightmap(samples, indices(triangles), pairs(uvs), size, points(lightmap),
+                                          back ? points(*back) : std::span<const glm::vec3>());
+        }
+        return vectors_to_numpy(std::move(diffuse));
+      },
+      nb::arg("samples"), nb::arg("triangles"), nb::arg("uvs"), nb::arg("size"), nb::arg("lightmap"),
+      nb::arg("back_lightmap") = nb::none(),
+      R"(The same from a lightmap: irradiance (size * size, 3) in texels on the texture coordinates (V, 2),
+rows from the top, v up, read bilinearly.)");
 }
 
 }  // namespace

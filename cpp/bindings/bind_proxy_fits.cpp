@@ -16,19 +16,12 @@
 namespace mirrorbake::bindings {
 namespace {
 
-using TriangleArray = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-
-std::span<const glm::vec3> points(const PointArray& array) {
-  return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
-}
-
 void bind_fits(nb::module_& m) {
   m.def(
       "area_weighted_centroid",
       [](PointArray positions, TriangleArray triangles) {
-        const std::span indices(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0));
         nb::gil_scoped_release release;
-        return area_weighted_centroid(points(positions), indices);
+        return area_weighted_centroid(points(positions), indices(triangles));
       },
       nb::arg("positions"), nb::arg("triangles"),
       R"(Area-weighted mean of the triangles' centroids: the origin of an object's maps ([PEM] section
@@ -138,13 +131,12 @@ InvalidArgument
   m.def(
       "hull_triangles",
       [](PointArray positions, TriangleArray triangles, double tolerance) {
-        const std::span indices(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0));
         std::vector<std::uint8_t> on_hull;
         {
           nb::gil_scoped_release release;
-          on_hull = hull_triangles(points(positions), indices, tolerance);
+          on_hull = hull_triangles(points(positions), indices(triangles), tolerance);
         }
-        return to_numpy(std::move(on_hull), {indices.size()});
+        return to_numpy(std::move(on_hull), {triangles.shape(0)});
       },
       nb::arg("positions"), nb::arg("triangles"), nb::arg("tolerance") = kHullTolerance,
       R"(1 for every triangle that lies on the mesh's convex hull, else 0; see

@@ -10,6 +10,7 @@
 #include "bind_enums.hpp"
 #include "mirrorbake/surface/run_time_model.hpp"
 #include "mirrorbake/surface/surface_samples.hpp"
+#include "mirrorbake/surface/texture_samples.hpp"
 #include "mirrorbake/surface/vertex_lookups.hpp"
 
 namespace mirrorbake::bindings {
@@ -101,19 +102,24 @@ when no light was traced.)");
 void bind_vertex_lookups(nb::module_& m) {
   m.def(
       "with_vertex_lookups",
-      [](const SurfaceSamples& samples, PointArray positions,
-         nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu> triangles,
-         PointArray lookups) {
+      [](const SurfaceSamples& samples, PointArray positions, TriangleArray triangles, PointArray lookups) {
         const nb::gil_scoped_release unlocked;
-        return with_vertex_lookups(
-            samples, {reinterpret_cast<const glm::vec3*>(positions.data()), positions.shape(0)},
-            {reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0)},
-            {reinterpret_cast<const glm::vec3*>(lookups.data()), lookups.shape(0)});
+        return with_vertex_lookups(samples, points(positions), indices(triangles), points(lookups));
       },
       nb::arg("samples"), nb::arg("positions"), nb::arg("triangles"), nb::arg("lookups"),
       R"(Samples that read a map at coordinates of the vertices, float32 (V, 3), interpolated over every
 triangle ([PEM] section 5): texture coordinates (u, v, 0), or lookups on a proxy. To be read through
 Proxy.infinite, since `reflection` is then the lookup itself, of any length.)");
+  m.def(
+      "texture_samples",
+      [](PointArray positions, TriangleArray triangles, UvArray uvs, int size, int per_side) {
+        const nb::gil_scoped_release unlocked;
+        return texture_samples(points(positions), indices(triangles), pairs(uvs), size, per_side);
+      },
+      nb::arg("positions"), nb::arg("triangles"), nb::arg("uvs"), nb::arg("size"), nb::arg("per_side") = 2,
+      R"(A surface as its texture sees it: samples of an image whose pixels are the `size`^2 texels (1 to
+4096) of a map on the texture coordinates, float32 (V, 2), v up, at `per_side`^2 (1 to 8) places of each,
+where a triangle has any. To be read through Proxy.infinite: `reflection` is (u, 1 - v, 0).)");
 }
 
 RunTimeModel checked(RunTimeModel model) {

@@ -26,11 +26,6 @@ auto image_to_numpy(Image&& image) {
 using IntList = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using FloatList = nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-std::span<const glm::vec3> points(const PointArray& array) {
-  static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
-  return {reinterpret_cast<const glm::vec3*>(array.data()), array.shape(0)};
-}
-
 void bind_tracing(nb::class_<Tracer>& tracer_type) {
   tracer_type
       .def(
@@ -165,7 +160,27 @@ tuple[NDArray[numpy.float32], NDArray[numpy.int32]])">(),
           nb::arg("object"), nb::arg("rays") = 256, nb::arg("seed") = 0, nb::arg("side") = SurfaceSide::front,
           signature<R"(def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ...,
 side: typing.Literal['front', 'back'] = ...) -> NDArray[numpy.float32])">(),
-          "Irradiance on one side of an object at every vertex, (vertices, 3), all light included.");
+          "Irradiance on one side of an object at every vertex, (vertices, 3), all light included.")
+      .def(
+          "surface_irradiance",
+          [](const Tracer& tracer, int object,
+             nb::ndarray<const std::uint32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu> triangles,
+             UvArray barycentric, int rays, std::uint64_t seed, SurfaceSide side) {
+            std::vector<glm::vec3> irradiance;
+            {
+              nb::gil_scoped_release released;
+              irradiance = tracer.surface_irradiance(object, {triangles.data(), triangles.shape(0)},
+                                                     pairs(barycentric), rays, seed, side);
+            }
+            return vectors_to_numpy(std::move(irradiance));
+          },
+          nb::arg("object"), nb::arg("triangles"), nb::arg("barycentric"), nb::arg("rays") = 256,
+          nb::arg("seed") = 0, nb::arg("side") = SurfaceSide::front,
+          signature<R"(def surface_irradiance(self, object: int, triangles: NDArray[numpy.uint32],
+barycentric: NDArray[numpy.float32], rays: int = ..., seed: int = ...,
+side: typing.Literal['front', 'back'] = ...) -> NDArray[numpy.float32])">(),
+          R"(The same at points of an object's surface, (n, 3): triangles (n,) and the weights (n, 2) of
+their second and third vertex.)");
 }
 
 void bind_camera(nb::module_& m) {

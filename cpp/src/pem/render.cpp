@@ -7,6 +7,7 @@
 #include "mirrorbake/core/check.hpp"
 #include "mirrorbake/core/error.hpp"
 #include "mirrorbake/core/parallel.hpp"
+#include "mirrorbake/envmap/reads.hpp"
 #include "mirrorbake/surface/lookup.hpp"
 #include "mirrorbake/surface/shells.hpp"
 
@@ -61,6 +62,47 @@ glm::vec3 incident_light(const SurfaceSamples& samples, std::size_t i, const Par
     if (composite.transmittance() == 0.0F) break;
   }
   return composite.light();
+}
+
+void check_triangles_of(const SurfaceSamples& samples, std::span<const glm::uvec3> triangles,
+                        const char* of_vertices, std::size_t vertices) {
+  check_length("samples.triangle", samples.triangle.size(), samples.size());
+  check_length("samples.barycentric", samples.barycentric.size(), samples.size());
+  for (const glm::uvec3& triangle : triangles) {
+    if (std::max({triangle.x, triangle.y, triangle.z}) >= vertices) {
+      throw InvalidArgument(of_vertices, std::to_string(vertices) + " entries",
+                            "one per vertex of the triangles");
+    }
+  }
+  for (const std::uint32_t triangle : samples.triangle) {
+    if (triangle >= triangles.size()) {
+      throw InvalidArgument("samples.triangle", std::to_string(triangle),
+                            "below " + std::to_string(triangles.size()));
+    }
+  }
+}
+
+template <typename Value>
+Value interpolated(std::span<const Value> of_vertices, glm::uvec3 triangle, glm::vec2 weights) {
+  return (1.0F - weights.x - weights.y) * of_vertices[triangle.x] + weights.x * of_vertices[triangle.y] +
+         weights.y * of_vertices[triangle.z];
+}
+
+/// D of every sample from `irradiance_at(i, is_back)`.
+template <typename IrradianceAt>
+std::vector<glm::vec3> diffuse_of(const SurfaceSamples& samples, bool has_backs,
+                                  const IrradianceAt& irradiance_at) {
+  const bool is_sided = has_backs && !samples.back.empty();
+  if (is_sided) check_length("samples.back", samples.back.size(), samples.size());
+  std::vector<glm::vec3> diffuse(samples.size());
+  parallel_for(samples.size(), 16384, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const glm::vec3 irradiance = irradiance_at(i, is_sided && samples.back[i] != 0);
+      diffuse[i] = samples.albedo[i] * irradiance * std::numbers::inv_pi_v<float>;
+      if (!samples.emission.empty()) diffuse[i] += samples.emission[i];
+    }
+  });
+  return diffuse;
 }
 
 }  // namespace
@@ -121,32 +163,35 @@ std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
                                                std::span<const glm::vec3> back_irradiance) {
   if (!back_irradiance.empty()) {
     check_length("back_irradiance", back_irradiance.size(), vertex_irradiance.size());
-    if (!samples.back.empty()) check_length("samples.back", samples.back.size(), samples.size());
   }
-  for (const glm::uvec3& triangle : triangles) {
-    if (std::max({triangle.x, triangle.y, triangle.z}) >= vertex_irradiance.size()) {
-      throw InvalidArgument("vertex_irradiance", std::to_string(vertex_irradiance.size()) + " entries",
-                            "one per vertex of the triangles");
-    }
-  }
-  std::vector<glm::vec3> diffuse(samples.size());
-  parallel_for(samples.size(), 16384, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      if (samples.triangle[i] >= triangles.size()) {
-        throw InvalidArgument("samples.triangle", std::to_string(samples.triangle[i]),
-                              "below " + std::to_string(triangles.size()));
-      }
-      const glm::uvec3 triangle = triangles[samples.triangle[i]];
-      const glm::vec2 b = samples.barycentric[i];
-      const bool is_back = !back_irradiance.empty() && !samples.back.empty() && samples.back[i] != 0;
-      const std::span<const glm::vec3> side = is_back ? back_irradiance : vertex_irradiance;
-      const glm::vec3 irradiance =
-          (1.0F - b.x - b.y) * side[triangle.x] + b.x * side[triangle.y] + b.y * side[triangle.z];
-      diffuse[i] = samples.albedo[i] * irradiance * std::numbers::inv_pi_v<float>;
-      if (!samples.emission.empty()) diffuse[i] += samples.emission[i];
-    }
+  check_triangles_of(samples, triangles, "vertex_irradiance", vertex_irradiance.size());
+  return diffuse_of(samples, !back_irradiance.empty(), [&](std::size_t i, bool is_back) {
+    const glm::uvec3 triangle = triangles[samples.triangle[i]];
+    const std::span<const glm::vec3> side = is_back ? back_irradiance : vertex_irradiance;
+    return interpolated(side, triangle, samples.barycentric[i]);
   });
-  return diffuse;
+}
+
+std::vector<glm::vec3> diffuse_from_lightmap(const SurfaceSamples& samples,
+                                             std::span<const glm::uvec3> triangles,
+                                             std::span<const glm::vec2> uvs, int size,
+                                             std::span<const glm::vec3> lightmap,
+                                             std::span<const glm::vec3> back_lightmap) {
+  check_range("size", size, 1, 4096);
+  const TexelTopology texels = TexelTopology::atlas(size, size);
+  const auto count = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  check_length("lightmap", lightmap.size(), count, "size * size");
+  if (!back_lightmap.empty()) check_length("back_lightmap", back_lightmap.size(), count, "size * size");
+  check_triangles_of(samples, triangles, "uvs", uvs.size());
+  return diffuse_of(samples, !back_lightmap.empty(), [&](std::size_t i, bool is_back) {
+    const glm::vec2 uv = interpolated(uvs, triangles[samples.triangle[i]], samples.barycentric[i]);
+    TexelReads reads;
+    add_bilinear(texels, 0, {uv.x, 1.0F - uv.y, 0.0F}, 1.0F, reads);
+    const std::span<const glm::vec3> side = is_back ? back_lightmap : lightmap;
+    glm::vec3 irradiance(0.0F);
+    for (const TexelWeight& read : reads) irradiance += read.weight * side[read.texel];
+    return irradiance;
+  });
 }
 
 }  // namespace mirrorbake

@@ -11,12 +11,6 @@
 /// What gathering light at the vertices of a mesh takes: the irradiance cache and Tracer::vertex_irradiance.
 namespace mirrorbake::tracing {
 
-struct TriangleCorner {
-  std::uint32_t object;
-  std::uint32_t triangle;
-  std::uint32_t corner;  ///< 0…2
-};
-
 /// Unit normal on the triangle's front, or 0 if it has no area.
 inline glm::vec3 face_normal(const World& world, std::uint32_t object, std::uint32_t triangle) {
   const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(object));

@@ -162,5 +162,37 @@ TEST(Render, DiffuseIsAlbedoTimesInterpolatedIrradianceOverPi) {
   EXPECT_THROW(diffuse_from_irradiance(samples, out_of_range, irradiance), InvalidArgument);
 }
 
+// Light that is linear in the coordinates is so between the middles of the texels.
+TEST(Render, ALightmapIsReadBilinearlyRowsFromTheTop) {
+  SurfaceSamples samples = testing::mirror_sphere_samples(8, 1);
+  for (glm::vec3& albedo : samples.albedo) albedo = glm::vec3(0.5F);
+  samples.back.assign(samples.size(), 0);
+  samples.back[1] = 1;
+  const glm::uvec3 triangles[1] = {{0, 1, 2}};
+  const glm::vec2 uvs[3] = {{0.25F, 0.25F}, {0.75F, 0.25F}, {0.25F, 0.75F}};
+  std::vector<glm::vec3> front, back;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      const float u = (static_cast<float>(column) + 0.5F) / 4.0F;
+      const float v = 1.0F - (static_cast<float>(row) + 0.5F) / 4.0F;
+      front.emplace_back(1.0F + u, 2.0F * v, u + v);
+      back.emplace_back(7.0F);
+    }
+  }
+  const std::vector<glm::vec3> diffuse = diffuse_from_lightmap(samples, triangles, uvs, 4, front, back);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const glm::vec2 b = samples.barycentric[i];
+    const float u = 0.25F + 0.5F * b.x, v = 0.25F + 0.5F * b.y;
+    const glm::vec3 expected = i == 1 ? glm::vec3(7.0F) : glm::vec3(1.0F + u, 2.0F * v, u + v);
+    const glm::vec3 found = diffuse[i] * 2.0F * std::numbers::pi_v<float>;
+    EXPECT_LT(glm::distance(found, expected), 1e-5F);
+  }
+  EXPECT_THROW(diffuse_from_lightmap(samples, triangles, uvs, 3, front), InvalidArgument);
+  EXPECT_THROW(diffuse_from_lightmap(samples, triangles, uvs, 8, front), InvalidArgument);
+  front.pop_back();
+  EXPECT_THROW(diffuse_from_lightmap(samples, triangles, uvs, 4, front), InvalidArgument);
+  EXPECT_THROW(diffuse_from_lightmap(samples, triangles, std::span(uvs, 2), 4, back), InvalidArgument);
+}
+
 }  // namespace
 }  // namespace mirrorbake

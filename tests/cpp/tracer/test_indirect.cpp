@@ -287,5 +287,39 @@ TEST(IndirectLight, VertexIrradianceOfAConstantSkyIsPi) {
   }
 }
 
+// A point light of intensity I at height h: E = I h / (h² + x²)^(3/2) below.
+TEST(IndirectLight, OfSurfacePointsIsEachOnesOwn) {
+  Scene scene;
+  const int floor = add_object(scene, floor_at(0.0F), matte(glm::vec3(0.5F)));
+  scene.point_lights.push_back({glm::vec3(0.0F, 2.0F, 0.0F), glm::vec3(3.0F)});
+  const Tracer tracer(scene, indirect(IndirectLight::none));
+  const TriangleMesh& mesh = scene.objects[0].mesh;
+  std::vector<std::uint32_t> triangles;
+  std::vector<glm::vec2> barycentric;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const glm::vec2 b : {glm::vec2(0.3F, 0.3F), glm::vec2(0.1F, 0.8F), glm::vec2(0.5F, 0.49F)}) {
+      triangles.push_back(t);
+      barycentric.push_back(b);
+    }
+  }
+  const std::vector<glm::vec3> found = tracer.surface_irradiance(floor, triangles, barycentric, 4, 1);
+  const std::vector<glm::vec3> below =
+      tracer.surface_irradiance(floor, triangles, barycentric, 4, 1, SurfaceSide::back);
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const glm::uvec3 t = mesh.triangles[triangles[i]];
+    const glm::vec2 b = barycentric[i];
+    const glm::vec3 p =
+        (1.0F - b.x - b.y) * mesh.positions[t.x] + b.x * mesh.positions[t.y] + b.y * mesh.positions[t.z];
+    const double expected = 6.0 / std::pow(4.0 + glm::dot(p, p), 1.5);
+    EXPECT_NEAR(found[i].x, expected, 1e-5 * expected);
+    EXPECT_EQ(below[i], glm::vec3(0.0F));
+  }
+  barycentric.pop_back();
+  EXPECT_THROW(tracer.surface_irradiance(floor, triangles, barycentric, 4, 1), InvalidArgument);
+  triangles = {static_cast<std::uint32_t>(mesh.triangles.size())};
+  barycentric.resize(1);
+  EXPECT_THROW(tracer.surface_irradiance(floor, triangles, barycentric, 4, 1), InvalidArgument);
+}
+
 }  // namespace
 }  // namespace mirrorbake

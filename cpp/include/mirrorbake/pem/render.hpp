@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -51,5 +52,13 @@ std::vector<glm::vec3> diffuse_from_irradiance(const SurfaceSamples& samples,
                                                std::span<const glm::uvec3> triangles,
                                                std::span<const glm::vec3> vertex_irradiance,
                                                std::span<const glm::vec3> back_irradiance = {});
+
+/// The same from a lightmap: irradiance in `size`² texels (1…4096) on the texture coordinates `uvs` of the
+/// vertices, rows from the top, v up, read bilinearly. Beyond its edge the texels there go on.
+std::vector<glm::vec3> diffuse_from_lightmap(const SurfaceSamples& samples,
+                                             std::span<const glm::uvec3> triangles,
+                                             std::span<const glm::vec2> uvs, int size,
+                                             std::span<const glm::vec3> lightmap,
+                                             std::span<const glm::vec3> back_lightmap = {});
 
 }  // namespace mirrorbake

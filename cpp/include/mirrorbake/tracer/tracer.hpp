@@ -212,6 +212,12 @@ class Tracer {
   std::vector<glm::vec3> vertex_irradiance(int object, int rays, std::uint64_t seed,
                                            SurfaceSide side = SurfaceSide::front) const;
 
+  /// The same at points of the surface, each alone: `barycentric` are the weights of the second and third
+  /// vertex of `triangles`. 0 on triangles without area.
+  std::vector<glm::vec3> surface_irradiance(int object, std::span<const std::uint32_t> triangles,
+                                            std::span<const glm::vec2> barycentric, int rays,
+                                            std::uint64_t seed, SurfaceSide side = SurfaceSide::front) const;
+
  private:
   struct State;
   explicit Tracer(std::unique_ptr<State> state);

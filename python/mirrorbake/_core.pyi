@@ -1022,6 +1022,13 @@ def with_vertex_lookups(samples: SurfaceSamples, positions: Annotated[NDArray[nu
     Proxy.infinite, since `reflection` is then the lookup itself, of any length.
     """
 
+def texture_samples(positions: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], size: int, per_side: int = 2) -> SurfaceSamples:
+    """
+    A surface as its texture sees it: samples of an image whose pixels are the `size`^2 texels (1 to
+    4096) of a map on the texture coordinates, float32 (V, 2), v up, at `per_side`^2 (1 to 8) places of each,
+    where a triangle has any. To be read through Proxy.infinite: `reflection` is (u, 1 - v, 0).
+    """
+
 class RunTimeModel:
     """
     How the renderer that will draw the maps reads them: what a map is inferred for.
@@ -1415,6 +1422,12 @@ class Tracer:
     def vertex_irradiance(self, object: int, rays: int = ..., seed: int = ..., side: Literal['front', 'back'] = ...) -> NDArray[numpy.float32]:
         """
         Irradiance on one side of an object at every vertex, (vertices, 3), all light included.
+        """
+
+    def surface_irradiance(self, object: int, triangles: NDArray[numpy.uint32], barycentric: NDArray[numpy.float32], rays: int = ..., seed: int = ..., side: Literal['front', 'back'] = ...) -> NDArray[numpy.float32]:
+        """
+        The same at points of an object's surface, (n, 3): triangles (n,) and the weights (n, 2) of
+        their second and third vertex.
         """
 
 def points_from_directions(projection: str, directions: NDArray[numpy.float32]) -> tuple[NDArray[numpy.int32], NDArray[numpy.float32]]:
@@ -2084,6 +2097,12 @@ def diffuse_from_irradiance(samples: SurfaceSamples, triangles: Annotated[NDArra
     """
     Diffuse radiance of every sample, float32 (len(samples), 3), from irradiance baked per vertex
     (V, 3). Samples that see the back of a triangle take that of `back_irradiance`, if it is given.
+    """
+
+def diffuse_from_lightmap(samples: SurfaceSamples, triangles: Annotated[NDArray[numpy.uint32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], uvs: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], size: int, lightmap: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], back_lightmap: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)] | None = None) -> NDArray[numpy.float32]:
+    """
+    The same from a lightmap: irradiance (size * size, 3) in texels on the texture coordinates (V, 2),
+    rows from the top, v up, read bilinearly.
     """
 
 class ProbedMatrix:

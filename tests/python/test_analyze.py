@@ -248,13 +248,13 @@ def test_what_the_scene_sets_is_obeyed_and_not_measured(tmp_path: Path) -> None:
         tmp_path,
         CONVEX,
         reflector={"parts": "split", "longest_edge": 0},
-        layers={"diffuse": True, "local": True, "hull_split": False},
+        layers={"diffuse": True, "lightmap": 0, "local": True, "hull_split": False},
         maps={"size": 32, "distant": "infinite", "shared_distant": False},
         trace={"depth": 5},
     )
     plan = analyze(stage)
     decided = [decision for decision in plan.decisions if not decision.automatic]
-    expected = [0, "split", 5, 4, True, True, False, "infinite", False, 32]
+    expected = [0, "split", 5, 4, True, 0, True, False, "infinite", False, 32]
     assert [decision.value for decision in decided] == expected
     assert all(decision.reason == SET for decision in decided)
     # What the quality decides needs no measuring, nor do the shells of [PEM] §4, but for their shapes.

@@ -17,6 +17,7 @@ from mirrorbake.evaluate.contact_sheet import contact_sheet
 from mirrorbake.evaluate.demo import demo_config
 from mirrorbake.evaluate.evaluate import Evaluation, evaluate
 from mirrorbake.evaluate.metrics import psnr
+from mirrorbake.pem.body_light import BodyLight
 from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.run_time import RunTime, lookups_of
 from mirrorbake.pem.store import PemStore
@@ -290,7 +291,7 @@ def test_a_diffuse_body_under_a_coat_has_a_diffuse_layer(tmp_path: Path) -> None
     drawn = pem.run_time.render("pem", 0.0, pem.stage.visibility(0.0))
     # Most of the light is diffuse: irradiance per vertex has to get it right.
     assert psnr(drawn, images.object, mask) > 25
-    without = RunTime(pem.store, stage.built.triangles)
+    without = RunTime(pem.store, BodyLight.of(stage.built, 0))
     without._irradiance = None
     assert psnr(without.render("pem", 0.0, pem.stage.visibility(0.0)), images.object, mask) < 20
 

@@ -32,7 +32,7 @@ def test_auto_is_a_value_of_every_key_that_is_decided_before_a_bake() -> None:
         "layers.local": False, "layers.hull_split": True, "maps.distant": "rotated box", "maps.size": 64,
         "maps.shared_distant": True,
         "trace.noise": 0.05, "views.traced": 1, "infer.passes": 3, "infer.neighbours": 0.5, "static.views": 8,
-        "reflector.longest_edge": 0.5, "reflector.parts": 4, "views.around": 4,
+        "reflector.longest_edge": 0.5, "layers.lightmap": 64, "reflector.parts": 4, "views.around": 4,
     }  # fmt: skip
     # Shells are a list of tables, which has tests of its own.
     assert values.keys() | {"shells"} == set(DECIDED_KEYS)

@@ -33,7 +33,6 @@ from mirrorbake.evaluate.references import (
 from mirrorbake.evaluate.single_maps import (
     SingleMaps,
     Targets,
-    has_own_texels,
     layer_at_infinity,
     layer_on_surface,
 )
@@ -44,6 +43,7 @@ from mirrorbake.scene.config_axes import SCENE_AXES
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.parameters import Axis, ParameterSpace
 from mirrorbake.scene.stage import Stage, prepare_stage
+from mirrorbake.scene.texture_coordinates import has_own_texels
 
 if TYPE_CHECKING:
     from pathlib import Path

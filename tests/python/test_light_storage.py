@@ -1,4 +1,4 @@
-"""Light that is stored at vertices: meshes get finer where it would be wrong between them."""
+"""Light of the body under the mirror, at vertices of a mesh that gets finer for it, or in a lightmap."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import pytest
 from mirrorbake import _core
 from mirrorbake.bake.analyze import analyze
 from mirrorbake.bake.bake import bake
+from mirrorbake.bake.body_light import Lightmap, irradiance_of, lit_sides, texels_near
 from mirrorbake.errors import InputError
 from mirrorbake.evaluate.metrics import psnr
-from mirrorbake.pem.opened import open_pem
+from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.pem.view_images import images_of_trace
 from mirrorbake.scene import refine
 from mirrorbake.scene.build import build_scene
@@ -139,17 +140,24 @@ def test_edges_that_are_too_short_are_refused(monkeypatch: pytest.MonkeyPatch) -
 # In a scene
 
 
-def coated(folder: Path, boxes: Sequence[Box], **sections: dict[str, Any]) -> dict[str, Any]:
-    """Boxes of one mesh in plastic, under a small sun."""
+def coated(
+    folder: Path, boxes: Sequence[Box], *, charts: bool = False, **sections: dict[str, Any]
+) -> dict[str, Any]:
+    """Boxes of one mesh in plastic, under a small sun; with `charts` on texture coordinates from -1 to 7."""
     lines, faces = [], []
     for number, box in enumerate(boxes):
         lines += [f"v {x} {y} {z}" for x, y, z in corners_of(box).tolist()]
-        faces += [
-            "f " + " ".join(f"{corner + 8 * number + 1}//{side + 1}" for corner in quad)
-            for side, quad in enumerate(FACES)
-        ]
+        for side, quad in enumerate(FACES):
+            corners = [f"{corner + 8 * number + 1}//{side + 1}" for corner in quad]
+            if charts:
+                row, column = divmod(6 * number + side, 4)
+                places = ((0, 0), (1, 0), (1, 1), (0, 1))
+                lines += [f"vt {2 * (column + 0.8 * u) - 1} {2 * (row + 0.8 * v) - 1}" for u, v in places]
+                first = 4 * (6 * number + side) + 1
+                corners = [text.replace("//", f"/{first + k}/") for k, text in enumerate(corners)]
+            faces.append("f " + " ".join(corners))
     normals = ("0 0 -1", "0 0 1", "0 -1 0", "1 0 0", "0 1 0", "-1 0 0")
-    path = folder / f"boxes-{len(boxes)}.obj"
+    path = folder / f"boxes-{len(boxes)}{'-charts' if charts else ''}.obj"
     path.write_text("\n".join([*lines, *(f"vn {normal}" for normal in normals), *faces]) + "\n")
     sky = np.full((32, 64, 3), 0.3, np.float32)
     sky[8:10, 20:22] = 120.0
@@ -169,13 +177,23 @@ def coated(folder: Path, boxes: Sequence[Box], **sections: dict[str, Any]) -> di
         "static": {"views": 0},
     }
     for name, section in sections.items():
-        scene[name] = {**scene[name], **section}
+        scene[name] = {**scene.get(name, {}), **section}
     return scene
 
 
-def edge_of(plan: Plan) -> Decision:
-    (decision,) = (decision for decision in plan.decisions if decision.key == "reflector.longest_edge")
+def decision_of(plan: Plan, key: str = "reflector.longest_edge") -> Decision:
+    (decision,) = (decision for decision in plan.decisions if decision.key == key)
     return decision
+
+
+def decibels_of(pem: OpenedPem, point: float = 0.0) -> float:
+    """How well a PEM shows the view of a point, against a tracing of its own."""
+    stage, options = pem.stage.at(point), pem.stage.options
+    options.samples_per_pixel, options.seed = 256, 7
+    camera = stage.built.cameras.camera((point,))
+    truth = images_of_trace(stage.tracer.trace_layers(camera, stage.built.reflector, options))
+    drawn = pem.run_time.render("pem", point, pem.stage.visibility(point, pem.run_time.places))
+    return psnr(drawn, truth.object, truth.coverage > 0.999)
 
 
 def test_a_shadow_on_a_large_triangle_makes_the_mesh_finer(tmp_path: Path) -> None:
@@ -185,13 +203,8 @@ def test_a_shadow_on_a_large_triangle_makes_the_mesh_finer(tmp_path: Path) -> No
         bake(parse_config(scene, "plate"), tmp_path / str(edge))
         pem = open_pem(tmp_path / str(edge))
         sizes[edge] = len(pem.stage.built.positions)
-        options = pem.stage.options
-        options.samples_per_pixel, options.seed = 256, 7
-        camera = pem.stage.built.cameras.camera((0.0,))
-        truth = images_of_trace(pem.stage.tracer.trace_layers(camera, pem.stage.built.reflector, options))
-        drawn = pem.run_time.render("pem", 0.0, pem.stage.visibility(0.0, pem.run_time.places))
-        decibels[edge] = psnr(drawn, truth.object, truth.coverage > 0.999)
-        decision = edge_of(pem.store.header.plan)
+        decibels[edge] = decibels_of(pem)
+        decision = decision_of(pem.store.header.plan)
         assert decision.automatic == (edge == "auto")
     assert sizes[0] == 48
     assert 300 < sizes["auto"] < 20_000
@@ -218,7 +231,7 @@ def test_the_mesh_stays_as_it_is_where_that_changes_nothing(
     tmp_path: Path, boxes: list[Box], sections: dict[str, Any], reason: str
 ) -> None:
     stage = prepare_stage(parse_config(coated(tmp_path, boxes, **sections), "plate"))
-    decision = edge_of(analyze(stage))
+    decision = decision_of(analyze(stage))
     assert reason in decision.reason
     assert decision.value == (0.05 if "set" in reason else 0.0)
 
@@ -226,6 +239,97 @@ def test_the_mesh_stays_as_it_is_where_that_changes_nothing(
 def test_fine_meshes_are_not_measured(tmp_path: Path) -> None:
     scene = coated(tmp_path, [PLATE])
     scene["reflector"] = {"object": "teapot"}
-    decision = edge_of(analyze(prepare_stage(parse_config(scene, "teapot"))))
+    decision = decision_of(analyze(prepare_stage(parse_config(scene, "teapot"))))
     assert (decision.value, decision.measured) == (0.0, None)
     assert decision.reason == "triangles are small in the picture"
+
+
+# In a lightmap
+
+
+def test_a_shadow_on_a_mesh_with_texture_coordinates_lies_in_a_lightmap(tmp_path: Path) -> None:
+    decibels = {}
+    for size in (0, "auto"):
+        scene = coated(tmp_path, [PLATE, POST], charts=True, layers={"lightmap": size})
+        bake(parse_config(scene, "plate"), tmp_path / str(size))
+        pem = open_pem(tmp_path / str(size))
+        decibels[size] = decibels_of(pem)
+    plan = pem.store.header.plan
+    decision, edge = decision_of(plan, "layers.lightmap"), decision_of(plan)
+    assert decision.automatic
+    assert isinstance(decision.value, int)
+    assert 16 <= decision.value <= 256
+    assert "in a map" in decision.reason
+    assert (edge.value, edge.reason) == (0.0, "the diffuse light is in a map")
+    assert len(pem.stage.built.positions) == 48
+    texels = pem.store.read_irradiance()
+    assert texels is not None
+    assert texels.shape == (decision.value**2, 3)
+    # As good as at the vertices of a finer mesh, which is better than at its own (see above).
+    assert decibels["auto"] > decibels[0] - 0.5
+
+
+def test_a_lightmap_of_linear_light_is_linear_and_black_where_nothing_reads_it(tmp_path: Path) -> None:
+    stage = prepare_stage(parse_config(coated(tmp_path, [PLATE], charts=True), "plate"))
+    lightmap = Lightmap(stage, 32)
+    places = np.asarray(lightmap.samples.reflection)[:, :2]
+    light = np.stack([1.0 + places[:, 0], 2.0 * places[:, 1], places.sum(axis=1)], axis=1)
+    texels = lightmap.inferred(light.astype(np.float32)).reshape(32, 32, 3)
+    middle = (np.arange(32) + 0.5) / 32
+    linear = np.stack(np.broadcast_arrays(1.0 + middle, 2.0 * middle[:, None], middle + middle[:, None]), -1)
+    seen = np.bincount(np.asarray(lightmap.samples.pixel), minlength=32 * 32).reshape(32, 32) == 9
+    assert seen.sum() > 300
+    np.testing.assert_allclose(texels[seen], linear[seen], atol=0.01)
+    black = ~texels.any(axis=-1)
+    assert 32 * 32 - black.sum() == lightmap.texels
+    assert black.sum() > 100
+
+
+def test_texels_near_some_are_those_and_the_eight_around() -> None:
+    near = texels_near(np.array([0, 27], np.uint32), 8).reshape(8, 8)
+    expected = np.zeros((8, 8), np.bool_)
+    expected[:2, :2] = expected[2:5, 2:5] = True
+    assert np.array_equal(near, expected)
+
+
+def test_a_lightmap_has_both_sides_of_a_sheet(tmp_path: Path) -> None:
+    sheet = tmp_path / "sheet.obj"
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    sheet.write_text(
+        "".join(f"v {x} {0.5 * x + 1.0} {-z}\nvt {(x + 1) / 2} {(z + 1) / 2}\n" for x, z in corners)
+        + "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+    )
+    scene = coated(tmp_path, [PLATE], layers={"lightmap": 16})
+    scene["reflector"] = {"mesh": str(sheet), "height": 1.0}
+    stage = prepare_stage(parse_config(scene, "sheet"))
+    assert lit_sides(stage) == 2
+    texels, vertices = irradiance_of(stage, 2, 16), irradiance_of(stage, 2)
+    # Nothing shades it: each side is lit alike everywhere, and otherwise than the other one.
+    np.testing.assert_allclose(texels.mean(axis=0), vertices.mean(axis=0), rtol=0.05)
+    assert abs(texels[:, 0].mean() - texels[:, 3].mean()) > 0.5 * texels[:, 3].mean()
+
+
+def test_a_lightmap_changes_with_the_scene(tmp_path: Path) -> None:
+    scene = coated(tmp_path, [PLATE, POST], charts=True, layers={"lightmap": 32})
+    scene["views"] = {"count": 1, "start": 20.0, "size": [64, 64]}
+    scene["light"] = {"turn": 90.0, "count": 2}
+    bake(parse_config(scene, "plate"), tmp_path / "pem")
+    pem = open_pem(tmp_path / "pem")
+    assert pem.store.has_irradiance_per_sample
+    first, last = (pem.store.read_irradiance(sample) for sample in (0, 1))
+    assert first is not None
+    assert last is not None
+    assert first.shape == last.shape == (32 * 32, 3)
+    assert np.abs(first - last).max() > 0.5 * first.max()
+
+
+def test_a_mesh_without_coordinates_of_its_own_has_no_lightmap(tmp_path: Path) -> None:
+    stage = prepare_stage(parse_config(coated(tmp_path, [PLATE], layers={"lightmap": 64}), "plate"))
+    with pytest.raises(InputError, match=r"layers.lightmap: 64: the mesh has no texture coordinates, or"):
+        analyze(stage)
+
+
+@pytest.mark.parametrize("size", [-1, 3, 8192, "big"])
+def test_lightmaps_of_other_sizes_are_refused(tmp_path: Path, size: Any) -> None:
+    with pytest.raises(InputError, match=r"layers\.lightmap"):
+        parse_config(coated(tmp_path, [PLATE], layers={"lightmap": size}), "plate")

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.pem.body_light import BodyLight
 from mirrorbake.pem.export.blocks import blocks_of, pixels_of
 from mirrorbake.pem.export.images import ImageFormat, linear_codes, srgb_codes
 from mirrorbake.pem.export.map_sets import run_time_attributes
@@ -28,7 +29,7 @@ from mirrorbake.pem.export.radiance_code import RadianceCode, atlas_shape, from_
 from mirrorbake.pem.export.source import ExportSource, MapEntry, Part, Shell
 from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.pem.pyramid import topology_of
-from mirrorbake.pem.run_time import diffuse_of, fade_weight
+from mirrorbake.pem.run_time import fade_weight
 from mirrorbake.pem.shells import moved_proxy
 from mirrorbake.projection import MAP_PROJECTIONS
 from mirrorbake.proxy import proxy_from_attributes, proxy_to_attributes
@@ -451,7 +452,8 @@ def reference(case: Case, pem: CasePem, code: RadianceCode, t: float, raised: fl
         parts[1] = [distant]
     normals = scene.mesh.normals
     here = irradiance(case, normals, first) * (1 - weight) + irradiance(case, normals, first + 1) * weight
-    diffuse = diffuse_of(samples, scene.mesh.triangles, here.astype(np.float32))
+    body = BodyLight(scene.mesh.triangles, scene.mesh.uvs)
+    diffuse = body.radiance(samples, here.astype(np.float32))
     return _core.render_reflector(samples, parts, diffuse, case.run_time)
 
 

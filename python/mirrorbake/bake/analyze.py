@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from mirrorbake.bake.count_parts import parts_decision
-from mirrorbake.bake.diffuse_edges import edge_decision
 from mirrorbake.bake.distant import distant_decision
+from mirrorbake.bake.light_storage import light_storage
 from mirrorbake.bake.map_sizes import map_sizes
 from mirrorbake.bake.probe import Probe, displayed_noise, relative_change
 from mirrorbake.bake.quality import QUALITIES, quality_decisions
@@ -65,7 +65,7 @@ def analyze(stage: Stage) -> Plan:
     probe = Probe.of(stage, MAX_DEPTH if trace.depth is None else trace.depth)
     depth = _depth(stage, probe)
     diffuse = _diffuse(stage, probe)
-    edge, stage = edge_decision(stage, has_diffuse=bool(diffuse.value))
+    edge, lightmap, stage = light_storage(stage, has_diffuse=bool(diffuse.value))
     if edge.automatic and edge.value:
         probe = Probe.of(stage, cast("int", depth.value))
     parts, labels = parts_decision(stage, probe)
@@ -94,6 +94,7 @@ def analyze(stage: Stage) -> Plan:
         depth,
         samples,
         diffuse,
+        lightmap,
         shells,
         *local,
         hull_split,

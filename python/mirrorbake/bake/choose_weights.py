@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.body_light import irradiance_of
 from mirrorbake.bake.captured import captured_pyramids
 from mirrorbake.bake.fit import DisplayFitter
-from mirrorbake.bake.sample import diffuse_layer
 from mirrorbake.bake.static_set import static_views, stripes_of
 from mirrorbake.bake.targets import ViewTracer
-from mirrorbake.pem.run_time import diffuse_of, model_of, shell_maps
+from mirrorbake.pem.body_light import BodyLight
+from mirrorbake.pem.run_time import model_of, shell_maps
 from mirrorbake.scene.config_axes import arranged
 from mirrorbake.scene.plan import USUAL_WEIGHT, Decision, with_weight
 from mirrorbake.tone import srgb_encoded
@@ -102,15 +103,16 @@ def _score(
 
     irradiance = None if contents.irradiance is None else contents.irradiance[0]
     if irradiance is not None and stage.space.changes_scene:
-        irradiance = diffuse_layer(stage, contents.lit_sides)
+        irradiance = irradiance_of(stage, contents.lit_sides, header.lightmap)
     parts = shell_maps(header, read, pose, contents.local_triangles)
+    body = BodyLight.of(stage.built, header.lightmap)
     decibels = []
     for views in held_out:
         errors = []
         for view in (one.view for one in views):
             diffuse = None
             if irradiance is not None:
-                diffuse = diffuse_of(view.lookups, stage.built.triangles, irradiance)
+                diffuse = body.radiance(view.lookups, irradiance)
             drawn = np.asarray(
                 _core.render_reflector(view.lookups, parts, diffuse, model_of(header.run_time))
             )

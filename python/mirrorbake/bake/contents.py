@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mirrorbake import _core
+from mirrorbake.bake.body_light import irradiance_of, lit_sides
 from mirrorbake.bake.fade import fit_fade
-from mirrorbake.bake.sample import SampleBaker, diffuse_layer, lit_sides
+from mirrorbake.bake.sample import SampleBaker
 from mirrorbake.bake.static_set import infer_static_set
 from mirrorbake.pem.header import Header
 from mirrorbake.pem.pyramid import capture
@@ -50,9 +51,10 @@ def contents_of(stage: Stage, plan: Plan, source: Source) -> Contents:
         # Where the scene changes, every sample writes its own.
         sides = lit_sides(stage)
         if built.space.changes_scene:
-            irradiance = np.zeros((len(built.space), len(built.positions), 3 * sides), np.float32)
+            count = plan.lightmap**2 or len(built.positions)
+            irradiance = np.zeros((len(built.space), count, 3 * sides), np.float32)
         else:
-            irradiance = diffuse_layer(stage, sides)[None]
+            irradiance = irradiance_of(stage, sides, plan.lightmap)[None]
     shared = bool(plan.value("maps.shared_distant"))
     header = Header(
         source=source,

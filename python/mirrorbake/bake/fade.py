@@ -10,7 +10,8 @@ import numpy as np
 from mirrorbake import _core
 from mirrorbake.bake.static_set import stripes_of
 from mirrorbake.bake.targets import ViewTracer
-from mirrorbake.pem.run_time import diffuse_of, fade_weight, model_of, shell_maps
+from mirrorbake.pem.body_light import BodyLight
+from mirrorbake.pem.run_time import fade_weight, model_of, shell_maps
 from mirrorbake.scene.config_axes import arranged
 from mirrorbake.tone import srgb_encoded
 
@@ -87,6 +88,7 @@ def held_out(
     tracer, model = ViewTracer(stage, header, contents.local_triangles), model_of(header.run_time)
     static_maps, maps, irradiance = contents.static_maps, baked.maps, baked.irradiance
     assert static_maps is not None
+    body = BodyLight.of(here.built, header.lightmap)
     if irradiance is None and contents.irradiance is not None:
         irradiance = contents.irradiance[0]
 
@@ -111,7 +113,7 @@ def held_out(
             lookups, images = stripe.view.lookups, stripe.view.images
             diffuse = None
             if irradiance is not None:
-                diffuse = diffuse_of(lookups, here.built.triangles, irradiance)
+                diffuse = body.radiance(lookups, irradiance)
             drawn = [np.asarray(_core.render_reflector(lookups, parts, diffuse, model)) for parts in sets]
             seen = (images.coverage > 0.99) & (drawn[0][..., 3] > 0.99)
             pixels.append((drawn[0][seen][:, :3], drawn[1][seen][:, :3], images.object[seen]))

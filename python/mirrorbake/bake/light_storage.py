@@ -1,47 +1,55 @@
-"""How long edges may be between the vertices at which the body's own light is stored."""
+"""How the light of the body under the mirror is stored: at vertices, how far apart, or in a lightmap."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.bake.probe import BRIGHTEST_SHARE, probe_points, small_cameras
-from mirrorbake.bake.sample import diffuse_layer, lit_sides
-from mirrorbake.pem.run_time import diffuse_of
+from mirrorbake.bake.body_light import Lightmap, irradiance_of, lit_sides
+from mirrorbake.bake.traced_light import LightmapTrial, TracedLight, small_views
 from mirrorbake.scene.plan import Decision
 from mirrorbake.scene.refine import refined
+from mirrorbake.scene.texture_coordinates import atlas_coordinates, has_own_texels
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
-
     from mirrorbake.arrays import FloatArray
     from mirrorbake.scene.stage import Stage
 
-    DoubleArray = NDArray[np.float64]
-
-KEY = "reflector.longest_edge"
-SAMPLES = 16
-"""Per pixel of each of two tracings of a trial image."""
-BLOCK = 4
-"""Pixels along a side of the blocks over which light is compared."""
+EDGE, LIGHTMAP = "reflector.longest_edge", "layers.lightmap"
 COARSE_PIXELS = 4
 """Of a trial image, that a triangle covers if light may change unseen between its vertices."""
 MOST_HALVINGS = 6
 MOST_VERTICES = 1 << 16
 """That a mesh is refined to."""
+SIZES = (16, 32, 64, 128, 256, 512)
+"""Texels along the sides of maps that are tried."""
+BYTES = 6
+"""Of a vertex or texel: three half floats for each side that is lit."""
+BYTES_OF_UV = 4
+"""Of a vertex, as a web page gets them."""
+BYTES_OF_VERTEX = 34
+"""The same of all else: position and normal, and two triangles."""
 
 
-def edge_decision(stage: Stage, *, has_diffuse: bool) -> tuple[Decision, Stage]:
-    """Decide `reflector.longest_edge`.
+class LightStorage(NamedTuple):
+    """How the light is stored, and the scene with the mesh that this leads to."""
+
+    edge: Decision
+    lightmap: Decision
+    stage: Stage
+
+
+def light_storage(stage: Stage, *, has_diffuse: bool) -> LightStorage:
+    """Decide `reflector.longest_edge` and `layers.lightmap`.
 
     Samples of small images of a few views are compared with light that is interpolated from the vertices.
     Where triangles are large in the picture and the difference is more than `auto.tolerance`, edges are
-    halved as often as the difference has to be; it is then measured again.
+    halved as often as the difference has to be; it is then measured again. A lightmap takes the place of the
+    vertices if it takes fewer bytes and changes the pictures by no more than the tolerance.
 
     Parameters
     ----------
@@ -50,29 +58,59 @@ def edge_decision(stage: Stage, *, has_diffuse: bool) -> tuple[Decision, Stage]:
     has_diffuse
         Whether the body's own light is stored at all.
 
-    Returns
-    -------
-    tuple
-        The decision, and the stage with the mesh that it leads to.
+    Raises
+    ------
+    InputError
+        The scene file asks for a lightmap, and the mesh has no texture coordinates for one.
     """
     config = stage.config
+    size, edge = config.layers.lightmap, config.reflector.longest_edge
+    kept = Decision(EDGE, None, edge or 0.0, edge is None, "set in the scene", None)
+    at_vertices = Decision(LIGHTMAP, None, size or 0, size is None, "set in the scene", None)
+    reason = None
+    if not has_diffuse:
+        reason = "there is no diffuse layer"
+    elif stage.space.changes_scene:
+        reason = "the scene changes, so that no view stands for all"
+    if size:
+        Lightmap(stage, size)
+    if reason is not None or (size is not None and edge is not None):
+        return LightStorage(_because(kept, reason), _because(at_vertices, reason), stage)
+    in_map = _because(kept, "the diffuse light is in a map")
+    if size:
+        return LightStorage(in_map, at_vertices, stage)
+    finer, light = stage, None
+    if edge is None:
+        kept, finer, light = _edge_decision(stage)
+    decision = at_vertices if size == 0 else _lightmap_decision(stage, finer, light)
+    if decision.value:
+        return LightStorage(in_map if kept.value else kept, decision, stage)
+    return LightStorage(kept, decision, finer)
 
-    def as_it_is(reason: str, measured: float | None = None) -> tuple[Decision, Stage]:
-        return Decision(KEY, None, 0.0, True, reason, measured), stage
 
-    if config.reflector.longest_edge is not None:
-        return Decision(KEY, None, config.reflector.longest_edge, False, "set in the scene", None), stage
+def _because(decision: Decision, reason: str | None) -> Decision:
+    """Return a decision that nothing was measured for, unless the scene file sets it."""
+    if reason is None or not decision.automatic:
+        return decision
+    return replace(decision, reason=reason)
+
+
+def _edge_decision(stage: Stage) -> tuple[Decision, Stage, FloatArray | None]:
+    """Return the decision, the stage that it leads to, and the light at its vertices, if it was gathered."""
+    config = stage.config
+    light = None
+
+    def as_it_is(reason: str, measured: float | None = None) -> tuple[Decision, Stage, FloatArray | None]:
+        return Decision(EDGE, None, 0.0, True, reason, measured), stage, light
+
     if config.reflector.scene_object is not None:
         return as_it_is("an object of a scene keeps its mesh")
-    if not has_diffuse:
-        return as_it_is("there is no diffuse layer")
-    if stage.space.changes_scene:
-        return as_it_is("the scene changes, so that no view stands for all")
-    views = small_views(stage)
-    coarse = _coarse_edge(stage, views)
+    coarse = _coarse_edge(stage)
     if coarse is None:
         return as_it_is("triangles are small in the picture")
-    before = change_by(stage, views, at_vertices(stage))
+    sides = lit_sides(stage)
+    light = irradiance_of(stage, sides)
+    before = TracedLight(stage).change_by(light)
     words = f"interpolating diffuse light between vertices changes the picture by {before:.2%} beyond noise"
     if before <= config.auto.tolerance:
         return as_it_is(words, before)
@@ -82,21 +120,64 @@ def edge_decision(stage: Stage, *, has_diffuse: bool) -> tuple[Decision, Stage]:
         edge *= math.sqrt(2.0)
     edge = float(f"{edge:.3g}")
     finer = stage.without_edges_above(edge)
-    after = change_by(finer, views, at_vertices(finer))
+    finer_light = irradiance_of(finer, sides)
+    after = TracedLight(finer).change_by(finer_light)
     if after > 0.8 * before:
         return as_it_is(f"{words}, and no less with finer triangles", before)
     count = len(finer.built.positions)
     reason = f"{words}, by {after:.2%} without longer edges, at {count} vertices"
-    return Decision(KEY, None, edge, True, reason, before), finer
+    return Decision(EDGE, None, edge, True, reason, before), finer, finer_light
 
 
-def small_views(stage: Stage) -> list[_core.Camera]:
-    """Return a few views of a stage as small pictures."""
-    small = small_cameras(stage.built.cameras)
-    return [small.camera(point) for point in probe_points(stage)]
+def _lightmap_decision(stage: Stage, finer: Stage, light: FloatArray | None) -> Decision:
+    """Compare the light at the vertices of a finer mesh with maps that are fitted to it.
+
+    None: it has yet to be gathered.
+    """
+
+    def decided(size: int, reason: str, measured: float | None = None) -> Decision:
+        return Decision(LIGHTMAP, None, size, True, reason, measured)
+
+    built, tolerance = finer.built, stage.config.auto.tolerance
+    uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
+    if not has_own_texels(built.positions, built.triangles, uvs):
+        return decided(0, "the mesh has no texture coordinates of its own for every place")
+    sides, own = lit_sides(finer), len(stage.built.positions)
+    at_vertices = BYTES * sides * len(built.positions) + BYTES_OF_VERTEX * (len(built.positions) - own)
+    coordinates = 0 if _has_textures(stage) else BYTES_OF_UV * own
+    words = f"light at the vertices takes {at_vertices / 1e3:.1f} kB"
+    trial: LightmapTrial | None = None
+    for size in SIZES:
+        lightmap = Lightmap(finer, size)
+        takes = BYTES * sides * lightmap.texels + coordinates
+        if takes >= at_vertices:
+            break
+        if trial is None:
+            trial = LightmapTrial(finer, irradiance_of(finer, sides) if light is None else light)
+        change = trial.change_by(lightmap, size)
+        if change <= tolerance:
+            reason = f"{words}, in a map {takes / 1e3:.1f} kB, which changes the picture by {change:.2%}"
+            return decided(size, reason, change)
+    return decided(0, f"{words}, in a map that changes the picture by no more than {tolerance:.1%} no less")
 
 
-def _coarse_edge(stage: Stage, views: Sequence[_core.Camera]) -> float | None:
+def _has_textures(stage: Stage) -> bool:
+    """Whether materials of the reflector have textures, so that its coordinates are exported with it."""
+    scene = stage.built.scene
+    materials = map(scene.material, set(scene.object_part_materials(stage.built.reflector)))
+    return any(
+        reference.texture >= 0
+        for material in materials
+        for reference in (
+            material.albedo_texture,
+            material.specular_texture,
+            material.roughness_texture,
+            material.normal_texture,
+        )
+    )
+
+
+def _coarse_edge(stage: Stage) -> float | None:
     """Mean longest edge of the triangles that are large in some views; None if they cover next to nothing."""
     built, options = stage.built, _core.TraceOptions(samples_per_pixel=1)
     seen = [
@@ -104,7 +185,7 @@ def _coarse_edge(stage: Stage, views: Sequence[_core.Camera]) -> float | None:
             stage.tracer.trace_visibility(view, built.reflector, options, [(0.5, 0.5)]).triangle,
             minlength=len(built.triangles),
         )
-        for view in views
+        for view in small_views(stage)
     ]
     covered = np.sum(seen, axis=0)
     coarse = np.where(np.max(seen, axis=0) > COARSE_PIXELS, covered, 0)
@@ -113,58 +194,3 @@ def _coarse_edge(stage: Stage, views: Sequence[_core.Camera]) -> float | None:
     corners = built.positions[built.triangles].astype(np.float64)
     edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1).max(axis=1)
     return float(np.average(edges, weights=coarse))
-
-
-def at_vertices(stage: Stage) -> Callable[[_core.SurfaceSamples], FloatArray]:
-    """Return what gives the radiance (n, 3) of samples' bodies from light at the vertices."""
-    irradiance = diffuse_layer(stage, lit_sides(stage))
-    return lambda samples: diffuse_of(samples, stage.built.triangles, irradiance)
-
-
-def change_by(
-    stage: Stage, views: Sequence[_core.Camera], drawn: Callable[[_core.SurfaceSamples], FloatArray]
-) -> float:
-    """Return how much drawing the bodies' light changes pictures, beyond noise.
-
-    Root mean square over blocks of `BLOCK`² pixels, less twice its standard error, relative to that of their
-    light, the brightest clipped.
-
-    Parameters
-    ----------
-    stage
-        With what is compared with: its tracer.
-    views
-        Pictures of them are traced twice.
-    drawn
-        Gives the radiance (n, 3) of samples' bodies.
-    """
-    built = stage.built
-    # The noise of two tracings is independent: the product of their errors holds the difference alone.
-    seeds = (stage.config.trace.seed, stage.config.trace.seed + 1)
-    errors: list[DoubleArray] = []
-    lights: list[DoubleArray] = []
-    counts = []
-    for view in views:
-        across = -(-view.width // BLOCK)
-        blocks = across * -(-view.height // BLOCK)
-        for seed in seeds:
-            options = _core.TraceOptions(samples_per_pixel=SAMPLES, max_specular_depth=0, seed=seed)
-            traced = stage.tracer.trace_layers(view, built.reflector, options)
-            samples = traced.samples
-            pixel = np.asarray(samples.pixel).astype(np.int64)
-            block = pixel // view.width // BLOCK * across + pixel % view.width // BLOCK
-            error = samples.diffuse - drawn(samples)
-            count = np.bincount(block, minlength=blocks)
-            for sums, values in ((errors, error), (lights, traced.sample_beauty)):
-                total = [np.bincount(block, values[:, c], blocks) for c in range(3)]
-                sums.append(np.stack(total, axis=-1) / np.maximum(count, 1)[:, None])
-            counts.append(count)
-    weights = np.minimum(np.concatenate(counts[::2]), np.concatenate(counts[1::2])).astype(np.float64)
-    weights /= weights.sum()
-    products = np.mean(np.concatenate(errors[::2]) * np.concatenate(errors[1::2]), axis=1)
-    square = float(weights @ products)
-    noise = math.sqrt(float(weights**2 @ (products - square) ** 2))
-    light = np.concatenate(lights[::2])
-    light = np.minimum(light, np.quantile(light[weights > 0.0], 1.0 - BRIGHTEST_SHARE) or np.inf)
-    scale = float(weights @ np.mean(light * light, axis=1))
-    return math.sqrt(max(square - 2.0 * noise, 0.0) / scale) if scale > 0.0 else 0.0

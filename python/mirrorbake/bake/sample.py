@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from mirrorbake import _core
 from mirrorbake.bake.around import places_around
+from mirrorbake.bake.body_light import irradiance_of
 from mirrorbake.bake.captured import captured_pyramids
 from mirrorbake.bake.fit import DisplayFitter, FitView, solve_options
 from mirrorbake.bake.static_set import static_views
@@ -25,8 +26,6 @@ from mirrorbake.scene.pose import AT_REST
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.store import Contents
     from mirrorbake.scene.parameters import Point
@@ -35,55 +34,6 @@ if TYPE_CHECKING:
 
     Maps = dict[tuple[str, str], FloatArray]
     Reports = dict[tuple[str, str], SolverReport]
-
-_MOST_RAYS, _LEAST_RAYS, _RAYS_OF_A_MESH = 1024, 16, 1 << 23
-_FINE_MESH, _SHARED_BY = 1 << 14, 4
-"""Vertices from which on neighbours share their rays, and how many times fewer each one then takes: the mean
-with a ring of six still has more than each would have had alone."""
-_PROBE_RAYS = (2, 16)
-
-
-def diffuse_layer(stage: Stage, sides: int) -> FloatArray:
-    """Return the irradiance at the reflector's vertices, (V, 3 * sides): on the front, and on the back.
-
-    Up to 1024 rays are gathered at a vertex. Of a fine mesh fewer, since more vertices share a pixel, and
-    vertices share them with their neighbours.
-    """
-    built = stage.built
-    count = max(1, len(built.positions))
-    rays = _RAYS_OF_A_MESH // count // (_SHARED_BY if count > _FINE_MESH else 1)
-    rays = min(_MOST_RAYS, max(_LEAST_RAYS, rays))
-    both: tuple[Literal["front", "back"], ...] = ("front", "back")
-    found = [
-        np.asarray(stage.tracer.vertex_irradiance(built.reflector, rays, stage.config.trace.seed, side))
-        for side in both[:sides]
-    ]
-    if count > _FINE_MESH:
-        found = [shared_over_triangles(irradiance, built.triangles) for irradiance in found]
-    return np.concatenate(found, axis=1)
-
-
-def shared_over_triangles(values: FloatArray, triangles: NDArray[np.uint32]) -> FloatArray:
-    """Return means of vertices' values (V, C) over the corners of the triangles (T, 3) at each vertex.
-
-    Vertices apart stay apart, as on both sides of a crease; ones without triangles keep their value.
-    """
-    corners = triangles.reshape(-1)
-    count = 3.0 * np.bincount(corners, minlength=len(values))
-    means = values.astype(np.float64)
-    there = count > 0.0
-    for channel in range(values.shape[1]):
-        of_triangles = np.sum(values[triangles, channel].astype(np.float64), axis=1)
-        sums = np.bincount(corners, np.repeat(of_triangles, 3), len(values))
-        means[there, channel] = sums[there] / count[there]
-    return means.astype(np.float32)
-
-
-def lit_sides(stage: Stage) -> int:
-    """Return 2 if light reaches the backs of the reflector's triangles, as in a bowl without thickness."""
-    seed, tracer, reflector = stage.config.trace.seed, stage.tracer, stage.built.reflector
-    lit = any(np.any(tracer.vertex_irradiance(reflector, rays, seed, "back")) for rays in _PROBE_RAYS)
-    return 2 if lit else 1
 
 
 class Probing(NamedTuple):
@@ -123,7 +73,7 @@ class BakedSample:
     """Pyramids (texels, C) by part and shell."""
     images: ViewImages
     irradiance: FloatArray | None
-    """(V, 3), or (V, 6) with the backs, where it differs from sample to sample."""
+    """(V, 3) at vertices or (S², 3) in a lightmap, (…, 6) with the backs, where samples differ in it."""
     timings: Timings
     reports: Reports
     rejected: int = 0
@@ -154,7 +104,7 @@ class SampleBaker:
         stage = self._stage.at(point)
         irradiance = None
         if self._header.space.changes_scene and self._header.plan.has_diffuse:
-            irradiance = diffuse_layer(stage, self._sides)
+            irradiance = irradiance_of(stage, self._sides, self._header.lightmap)
         captured = captured_pyramids(stage, self._header) if stage.place else self._captured
         pose = arranged(self._stage.config, self._header.space.scene_coordinates(point)).pose
         if self._infer.fit == "display":

@@ -200,6 +200,11 @@ class Header:
         return [topology_of(self.projection, entry.size) for entry in self.maps]
 
     @property
+    def lightmap(self) -> int:
+        """Texels along a side of the map of the diffuse layer's irradiance; 0: it is at the vertices."""
+        return self.plan.lightmap
+
+    @property
     def sizes_in_words(self) -> str:
         """Texels of the maps' faces: `256²`, or `64² to 256²`."""
         sizes = sorted({entry.size for entry in self.maps})

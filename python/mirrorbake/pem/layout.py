@@ -63,9 +63,10 @@ class Contents:
     capture: FloatArray
     """The captured map's finest level, shape (F, S, S, 3), F faces."""
     irradiance: FloatArray | None
-    """Diffuse layer, shape (1, V, C), or (N, V, C) that each sample fills; None: there is none.
+    """Diffuse layer, shape (1, R, C), or (N, R, C) that each sample fills; None: there is none.
 
-    C is 3, the fronts alone, or 6, fronts and backs.
+    R is a row for each vertex, or for each texel of a lightmap. C is 3, the fronts alone, or 6, fronts and
+    backs.
     """
     local_triangles: NDArray[np.uint8] | None
     """Shape (T,), 0 for triangles of the reflector that shells for `off hull` leave out; None: for none."""
@@ -102,7 +103,7 @@ def sample_layouts(header: Header) -> dict[str, Layout]:
 
 
 MOST_OF_A_MESH = 1 << 28
-"""Vertices or triangles that a reflector may have."""
+"""Vertices or triangles that a reflector may have, and texels of a lightmap."""
 
 
 def shared_layout(name: str, shape: tuple[int, ...], header: Header) -> Layout:
@@ -130,7 +131,7 @@ def shared_layout(name: str, shape: tuple[int, ...], header: Header) -> Layout:
     samples = len(header.space) if header.space.changes_scene else 1
     channels = 6 if shape[-1:] == (6,) else 3
     whole, chunk = (samples, counted, channels), (1, counted, channels)
-    return Layout(whole, chunk, None, "float32", ("sample", "vertex", "channel"))
+    return Layout(whole, chunk, None, "float32", ("sample", _row_name(header), "channel"))
 
 
 def counted_in(name: str, shape: tuple[int, ...]) -> int:
@@ -138,6 +139,10 @@ def counted_in(name: str, shape: tuple[int, ...]) -> int:
     place = {"local_triangles": 0, "diffuse/irradiance": 1}.get(name)
     count = shape[place] if place is not None and place < len(shape) else 0
     return count if 0 < count <= MOST_OF_A_MESH else 0
+
+
+def _row_name(header: Header) -> str:
+    return "texel" if header.lightmap else "vertex"
 
 
 def codecs_of(dtype: str) -> tuple[BloscCodec, Crc32cCodec]:
@@ -167,7 +172,8 @@ def fill_group(store: Store, contents: Contents) -> None:
     _make(group, "static/capture", capture, dimensions, capture.shape)[...] = capture
     if irradiance is not None:
         shape = (1, *irradiance.shape[1:])
-        array = _make(group, "diffuse/irradiance", irradiance, ("sample", "vertex", "channel"), shape)
+        dimensions_of = ("sample", _row_name(header), "channel")
+        array = _make(group, "diffuse/irradiance", irradiance, dimensions_of, shape)
         # Where the scene changes, every sample writes its own.
         if not header.space.changes_scene:
             array[...] = irradiance

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mirrorbake.errors import StoreError
+from mirrorbake.pem.body_light import BodyLight
 from mirrorbake.pem.header import Source
 from mirrorbake.pem.run_time import RunTime
 from mirrorbake.pem.store import PemStore
@@ -59,7 +60,7 @@ def open_pem(directory: Location | Path | str, stage: Stage | None = None) -> Op
     plan = store.header.plan
     stage = (stage or prepare_stage(plan.shaped(config))).planned(plan)
     store.check_mesh(len(stage.built.positions), len(stage.built.triangles))
-    return OpenedPem(store, stage, RunTime(store, stage.built.triangles))
+    return OpenedPem(store, stage, RunTime(store, BodyLight.of(stage.built, store.header.lightmap)))
 
 
 def built_scene(store: PemStore) -> BuiltScene:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mirrorbake.arrays import FloatArray
+    from mirrorbake.pem.body_light import BodyLight
     from mirrorbake.pem.header import Header
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.parameters import PointLike
@@ -99,15 +100,6 @@ TRACED_SAMPLES = "reference"
 """Name of the run time that reads maps once for every traced sample."""
 
 
-def diffuse_of(
-    samples: _core.SurfaceSamples, triangles: NDArray[np.uint32], irradiance: FloatArray
-) -> FloatArray:
-    """Return the radiance (n, 3) of samples' bodies from irradiance (V, 3), or (V, 6) with the backs."""
-    front = np.ascontiguousarray(irradiance[:, :3])
-    back = np.ascontiguousarray(irradiance[:, 3:]) if irradiance.shape[1] > 3 else None
-    return np.asarray(_core.diffuse_from_irradiance(samples, triangles, front, back))
-
-
 @dataclass
 class RunTime:
     """A PEM opened for drawing.
@@ -116,8 +108,8 @@ class RunTime:
     """
 
     store: PemStore
-    triangles: NDArray[np.uint32]
-    """(T, 3) of the reflector."""
+    body: BodyLight
+    """How the light of the reflector's body is read."""
     remap: Callable[[FloatArray], FloatArray] | None = None
     """What a map (texels, C) of a view becomes before it is drawn; None: it stays as it is stored."""
 
@@ -209,7 +201,7 @@ class RunTime:
         irradiance = self._irradiance_at(point)
         if irradiance is None:
             return None
-        return diffuse_of(samples, self.triangles, irradiance)
+        return self.body.radiance(samples, irradiance)
 
     def _pem_parts(self, point: PointLike, away: float) -> list[list[_core.ShellMap]]:
         blend = self._header.space.neighbours(point)

@@ -8,7 +8,8 @@ array                 shape           holds
 `maps`                (N, M, T, C)    every map of a sample: finest level, residuals of the others, then 0
 `reference`           (N, H, W, 7)    ray traced: object R G B, its coverage, background R G B
 `record`              (N, K)          seconds, clamped values and the solver's report. Written last
-`diffuse/irradiance`  (1|N, V, 3|6)   W m⁻² at the object's vertices: on fronts, and on backs if lit
+`diffuse/irradiance`  (1|N, V, 3|6)   W m⁻² at the object's vertices: on fronts, and on backs if lit. Or
+                      (1|N, L², 3|6)  in a lightmap of L² texels, rows from the top (`layers.lightmap`)
 `static/capture`      (F, S, S, 3)    traced from the object's centre, the object removed
 `static/maps`         (M, T, 4)       the static set: maps for views far from all samples, if there is one
 `local_triangles`     (T,)            0: on the convex hull, where no shell for `off hull` is read
@@ -291,7 +292,7 @@ class PemStore:
         delete_key(self._group.store, f"record/c/{index}/0")
 
     def write_irradiance(self, index: int, irradiance: FloatArray) -> None:
-        """Write the diffuse layer (V, 3 or 6) of one sample, where it is not the same for all."""
+        """Write the irradiance (V or L², 3 or 6) of one sample, where it is not the same for all."""
         self._array("diffuse/irradiance")[index] = irradiance
 
     def read_map(self, part: str, layer: str, index: int) -> FloatArray:
@@ -339,7 +340,7 @@ class PemStore:
         return tuple(map(read_back, self._read("static/maps"), sizes, [self.header] * len(sizes)))
 
     def read_irradiance(self, index: int = 0) -> FloatArray | None:
-        """Irradiance at the object's vertices in one sample, shape (V, 3), or (V, 6) with backs; or None."""
+        """Irradiance in one sample, (V, 3) or in a lightmap (L², 3), or (…, 6) with backs; or None."""
         if not self._has("diffuse/irradiance"):
             return None
         return self._read("diffuse/irradiance", index if self.has_irradiance_per_sample else 0).astype(
@@ -359,9 +360,8 @@ class PemStore:
 
     def sample_bytes(self, index: int) -> int:
         """Bytes that a sample takes."""
-        names = [*_SAMPLE_ARRAYS]
-        if self._has("diffuse/irradiance") and self.has_irradiance_per_sample:
-            names.append("diffuse/irradiance")
+        per_sample = self._has("diffuse/irradiance") and self.has_irradiance_per_sample
+        names = [*_SAMPLE_ARRAYS, *(["diffuse/irradiance"] if per_sample else [])]
         return sum(stored_bytes(self._group.store, _key(self._array(name), name, index)) for name in names)
 
     def map_bytes(self, index: int) -> int:
@@ -370,11 +370,12 @@ class PemStore:
 
     def check_mesh(self, vertices: int, triangles: int) -> None:
         """Raise StoreError unless what is stored of the mesh is for so many vertices and triangles."""
-        for name, count in (("diffuse/irradiance", vertices), ("local_triangles", triangles)):
+        rows = self.header.lightmap**2 or vertices
+        for name, count in (("diffuse/irradiance", rows), ("local_triangles", triangles)):
             stored = counted_in(name, self._array(name).shape) if self._has(name) else count
             if stored != count:
                 where = f"{self.location}/{GROUP_NAME}"
-                raise StoreError(f"{where}: damaged: {name} is for {stored} of a mesh, expected {count}")
+                raise StoreError(f"{where}: damaged: {name} has {stored} rows, expected {count}")
 
     def array_names(self) -> list[str]:
         """Names of the arrays that are not of single samples."""

@@ -211,7 +211,10 @@ class Layers(Section):
     """[layers]: which layers the reflector gets. None stands for "auto" here and below."""
 
     diffuse: Annotated[bool | None, *AUTO] = None
-    """What the body reflects and emits, as irradiance at the vertices. "auto": if it changes the picture."""
+    """What the body reflects and emits, as irradiance. "auto": if it changes the picture."""
+    lightmap: Annotated[Literal[0] | MapSize | None, *AUTO] = None
+    """Texels along a side of a map on the mesh's texture coordinates, a power of two, that holds the body's
+    irradiance; 0: it is at the vertices. "auto": what takes fewer bytes at equal error."""
     local: Annotated[bool | None, *AUTO] = None
     """Maps of the object's reflection in itself. "auto": for the parts whose picture it changes; without it
     a single map per part holds everything."""

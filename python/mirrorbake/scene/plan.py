@@ -21,6 +21,7 @@ DECIDED_KEYS = (
     "trace.depth",
     "trace.samples",
     "layers.diffuse",
+    "layers.lightmap",
     "shells",
     "layers.local",
     "layers.hull_split",
@@ -154,6 +155,12 @@ class Plan:
         """Whether there is a diffuse layer."""
         return bool(self.value("layers.diffuse"))
 
+    @property
+    def lightmap(self) -> int:
+        """Texels along a side of the map of the diffuse layer's irradiance; 0: it is at the vertices."""
+        decided = (decision.value for decision in self.decisions if decision.key == "layers.lightmap")
+        return cast("int", next(decided, 0)) if self.has_diffuse else 0
+
     def has_local(self, part: str) -> bool:
         """Whether a part of the reflector gets a map of what the object reflects of itself."""
         return bool(self.value("layers.local", part))
@@ -228,8 +235,8 @@ class Plan:
             tuple(data["advice"]),
             SpacingLaw.from_dict(data["law"]) if "law" in data else None,
         )
-        # Without a decision on its edges the mesh is as its file has it.
-        for key in DECIDED_KEYS[1:]:
+        # Without decisions on them the mesh is as its file has it, and the body's light at its vertices.
+        for key in set(DECIDED_KEYS) - {"reflector.longest_edge", "layers.lightmap"}:
             if all(decision.key != key for decision in plan.decisions):
                 raise KeyError(key)
         return plan

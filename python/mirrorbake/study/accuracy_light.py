@@ -243,6 +243,9 @@ def _tracing() -> list[Accuracy]:
     off = irradiance[used] / (GREY * math.pi) - 1.0
     captured = tracer.capture_cube((0.0, 3.0, 0.0), 8, [ball], mb.TraceOptions(samples_per_pixel=1))
     body = mb.diffuse_from_irradiance(samples, mesh.triangles, np.full_like(irradiance, GREY * math.pi))
+    weights = np.full((len(mesh.triangles), 2), 1 / 3, np.float32)
+    middles = tracer.surface_irradiance(ball, np.arange(len(weights), dtype=np.uint32), weights, 1024, 1)
+    lit = np.asarray(middles) / (GREY * math.pi) - 1.0
     sky = "a grey sky"
     return [
         Accuracy("`Tracer.trace_layers`", "a mirror ball", sky, "relative", _worst(light / GREY, 1.0), 1e-6),
@@ -258,7 +261,27 @@ def _tracing() -> list[Accuracy]:
             "`diffuse_from_irradiance`", "a ball of albedo ½", "ρ E / π", "relative",
             _worst(np.asarray(body) / (0.5 * GREY), 1.0), 1e-6,
         ),
+        Accuracy(
+            "`Tracer.surface_irradiance`", "a ball, 1024 rays", "π L of a grey sky", "relative, RMS",
+            float(np.sqrt(np.mean(lit**2))), 0.01,
+        ),
+        _lightmap(samples, mesh),
     ]  # fmt: skip
+
+
+def _lightmap(samples: mb.SurfaceSamples, mesh: mb.TriangleMesh) -> Accuracy:
+    """Light that is linear in the texture coordinates is read as it is."""
+    uvs = (0.1 + 0.8 * np.asarray(mesh.uvs)).astype(np.float32)
+    middle = (np.arange(32) + 0.5) / 32
+    u, v = np.broadcast_arrays(middle, 1.0 - middle[:, None])
+    linear = np.stack([1.0 + u, 2.0 - v, u + v + 1.0], axis=-1).reshape(-1, 3)
+    body = mb.diffuse_from_lightmap(samples, mesh.triangles, uvs, 32, linear.astype(np.float32))
+    b = np.asarray(samples.barycentric, float)
+    weights = np.stack([1.0 - b.sum(axis=1), b[:, 0], b[:, 1]], axis=-1)
+    s, t = np.einsum("nk,nkc->cn", weights, uvs[mesh.triangles[samples.triangle]].astype(float))
+    exact = 0.5 / math.pi * np.stack([1.0 + s, 2.0 - t, s + t + 1.0], axis=-1)
+    error = _worst(np.asarray(body) / exact, 1.0)
+    return Accuracy("`diffuse_from_lightmap`", "light linear in (u, v)", "ρ E / π", "relative", error, 2e-6)
 
 
 def _matrices() -> list[Accuracy]:

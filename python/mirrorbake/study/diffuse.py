@@ -10,37 +10,26 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse
-import scipy.sparse.linalg
 
-from mirrorbake.bake.diffuse_edges import at_vertices, change_by, small_views
-from mirrorbake.bake.sample import diffuse_layer
+from mirrorbake.bake.body_light import Lightmap, irradiance_of, lit_sides
+from mirrorbake.bake.light_storage import BYTES, SIZES
+from mirrorbake.bake.traced_light import TracedLight
 from mirrorbake.errors import InputError, one_line_errors
 from mirrorbake.scene.load import load_config, parse_override
 from mirrorbake.scene.stage import prepare_stage
+from mirrorbake.scene.texture_coordinates import atlas_coordinates, has_own_texels
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
-    from mirrorbake import _core
-    from mirrorbake.arrays import FloatArray
     from mirrorbake.scene.config import SceneConfig
-    from mirrorbake.scene.stage import Stage
 
 HALVINGS = 5
 """Of the mesh's mean edge."""
-SIZES = (16, 32, 64, 128, 256)
-"""Texels along the sides of maps."""
-TRUTH_VERTICES = 1 << 15
-"""Of the mesh whose light maps are fitted to."""
-SMOOTHNESS = 1e-3
-"""λ of squared differences of neighbouring texels."""
-BYTES = 6
+MOST_VERTICES = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -49,7 +38,7 @@ class Storage:
 
     name: str
     values: int
-    """Vertices, or texels that are read."""
+    """Vertices, or texels that are read, on each side that is lit."""
     change: float
     """Of the picture, beyond noise, relative."""
 
@@ -69,73 +58,24 @@ def ways_to_store(config: SceneConfig) -> Iterator[Storage]:
     materials = map(built.scene.material, built.scene.object_part_materials(built.reflector))
     if not any(any(material.albedo) or any(material.emission) for material in materials):
         raise InputError("material.albedo: black, so that there is no diffuse light to store")
-    views = small_views(stage)
     corners = built.positions[built.triangles].astype(np.float64)
     edge = float(np.mean(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1)))
-    finest = stage
-    for halvings in range(HALVINGS + 1):
-        finer = stage.without_edges_above(edge / 2**halvings) if halvings else stage
-        if halvings and len(finer.built.positions) > TRUTH_VERTICES:
+    traced, sides = TracedLight(stage), lit_sides(stage)
+    change = traced.change_by(irradiance_of(stage, sides))
+    yield Storage("vertices as they are", sides * len(built.positions), change)
+    for halvings in range(1, HALVINGS + 1):
+        finer = stage.without_edges_above(edge / 2**halvings)
+        if len(finer.built.positions) > MOST_VERTICES:
             break
-        finest = finer
-        name = (
-            f"vertices, edges up to {1e3 * edge / 2**halvings:.3g} mm" if halvings else "vertices as they are"
-        )
-        yield Storage(name, len(finer.built.positions), change_by(finer, views, at_vertices(finer)))
-    coordinates = np.asarray(built.scene.object_mesh(built.reflector).uvs)
-    if len(coordinates):
-        light = diffuse_layer(finest, 1)
+        name = f"vertices, edges up to {1e3 * edge / 2**halvings:.3g} mm"
+        change = TracedLight(finer).change_by(irradiance_of(finer, sides))
+        yield Storage(name, sides * len(finer.built.positions), change)
+    uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
+    if has_own_texels(built.positions, built.triangles, uvs):
         for size in SIZES:
-            drawn, texels = in_map(finest, light, size)
-            yield Storage(f"map of {size}²", texels, change_by(finest, views, drawn))
-
-
-def in_map(
-    stage: Stage, light: FloatArray, size: int
-) -> tuple[Callable[[_core.SurfaceSamples], FloatArray], int]:
-    """Fit a map on the mesh's texture coordinates to the light (V, 3) at its vertices.
-
-    Returns
-    -------
-    tuple
-        What gives the radiance (n, 3) of samples' bodies, and how many texels are read.
-    """
-    built = stage.built
-    mesh = built.scene.object_mesh(built.reflector)
-    uvs, triangles = np.asarray(mesh.uvs), np.asarray(mesh.triangles)
-    reads = _bilinear(uvs, size)
-    across = scipy.sparse.eye_array(size * size) - scipy.sparse.eye_array(size * size, k=1)
-    down = scipy.sparse.eye_array(size * size) - scipy.sparse.eye_array(size * size, k=size)
-    system = scipy.sparse.vstack([reads, SMOOTHNESS**0.5 * across, SMOOTHNESS**0.5 * down]).tocsr()
-    zeros = np.zeros(2 * size * size)
-    texels = np.stack(
-        [scipy.sparse.linalg.lsqr(system, np.concatenate([light[:, c], zeros]))[0] for c in range(3)], axis=-1
-    )
-
-    def drawn(samples: _core.SurfaceSamples) -> FloatArray:
-        b = np.asarray(samples.barycentric)
-        weights = np.stack([1.0 - b[:, 0] - b[:, 1], b[:, 0], b[:, 1]], axis=-1)
-        places = np.einsum("nk,nkc->nc", weights, uvs[triangles[samples.triangle]])
-        found: FloatArray = (samples.albedo * (_bilinear(places, size) @ texels) / np.pi).astype(np.float32)
-        return found + samples.emission if len(samples.emission) else found
-
-    return drawn, int(np.count_nonzero(np.bincount(reads.indices, minlength=size * size)))
-
-
-def _bilinear(uvs: NDArray[Any], size: int) -> Any:
-    """Rows that read a map of size² texels at coordinates (n, 2)."""
-    place = np.mod(uvs, 1.0) * size - 0.5
-    low = np.floor(place).astype(np.int64)
-    share = place - low
-    rows, columns, weights = [], [], []
-    for right in (0, 1):
-        for up in (0, 1):
-            x, y = np.clip(low[:, 0] + right, 0, size - 1), np.clip(low[:, 1] + up, 0, size - 1)
-            rows.append(np.arange(len(uvs)))
-            columns.append(y * size + x)
-            weights.append(np.abs(1 - right - share[:, 0]) * np.abs(1 - up - share[:, 1]))
-    entries = (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns)))
-    return scipy.sparse.coo_array(entries, shape=(len(uvs), size * size)).tocsr()
+            lightmap = Lightmap(stage, size)
+            texels = lightmap.inferred(lightmap.gathered(sides))
+            yield Storage(f"map of {size}²", sides * lightmap.texels, traced.change_by(texels, size))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -15,6 +15,7 @@ from mirrorbake.evaluate.contenders import Contender, main_run_time, run_time_of
 from mirrorbake.evaluate.evaluate import Onlooker
 from mirrorbake.evaluate.metrics import flip
 from mirrorbake.evaluate.places import choose_views
+from mirrorbake.pem.body_light import BodyLight
 from mirrorbake.pem.opened import OpenedPem
 from mirrorbake.pem.pyramid import coarse_end, pyramid_of, size_of
 from mirrorbake.pem.run_time import RunTime
@@ -178,7 +179,7 @@ class Bench:
         summary = bake(config, directory, watch, stage)
         store = PemStore.open(directory)
         stage = stage.planned(summary.plan)
-        pem = OpenedPem(store, stage, RunTime(store, stage.built.triangles))
+        pem = OpenedPem(store, stage, RunTime(store, BodyLight.of(stage.built, store.header.lightmap)))
         return pem, watch.seconds / len(pem.space)
 
     def _look(self, opened: OpenedPem, seconds: float, settings: Mapping[str, Setting]) -> Trial:

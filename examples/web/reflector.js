@@ -17,6 +17,7 @@ export async function loadReflector(base, glb, name) {
   );
   const functions = (await Promise.all(texts)).join("\n");
   const gltf = await new GLTFLoader().loadAsync(glb);
+  const lightmap = await loadLightmap(gltf.parser);
   const textures = new Map();
   const meshes = [];
   gltf.scene.traverse((object) => object.isMesh && meshes.push(object));
@@ -28,7 +29,7 @@ export async function loadReflector(base, glb, name) {
       if (!textures.has(shell.files[0])) textures.set(shell.files[0], await loadCube(`${base}/${shell.files[0]}`));
     }
     const { _irradiance, _irradiance_back } = mesh.geometry.attributes;
-    const diffuse = { front: _irradiance !== undefined, back: _irradiance_back !== undefined };
+    const diffuse = { front: _irradiance !== undefined, back: _irradiance_back !== undefined, lightmap };
     const { side } = mesh.material;
     const material = (stack) =>
       shellMaterial(stack, textures, surface, description.runTime, functions, diffuse, side);
@@ -38,6 +39,26 @@ export async function loadReflector(base, glb, name) {
     mesh.material = [material(shells), material(shells.filter((shell) => !shell.off_hull))];
   }
   return gltf.scene;
+}
+
+// The irradiance of fronts and backs where it is a map on the texture coordinates, and the corners of that; null: it is at
+// the vertices.
+async function loadLightmap(parser) {
+  const described = parser.json.extensions[EXTENSION].lightmap;
+  if (!described) return null;
+  const { size, low, high, front, back } = described;
+  const load = async (accessor) => {
+    const { array } = await parser.getDependency("accessor", accessor);
+    const data = new Uint16Array(4 * size * size);
+    for (let i = 0; i < array.length; ++i) data[4 * Math.floor(i / 3) + (i % 3)] = THREE.DataUtils.toHalfFloat(array[i]);
+    const texture = new THREE.DataTexture(data, size, size, THREE.RGBAFormat, THREE.HalfFloatType);
+    texture.magFilter = texture.minFilter = THREE.LinearFilter;
+    texture.needsUpdate = true;
+    return texture;
+  };
+  const [frontLight, backLight] = await Promise.all([load(front), load(back ?? front)]);
+  const [uvLow, uvHigh] = [low, high].map((corner) => new THREE.Vector2(...corner));
+  return { frontLight, backLight, uvLow, uvHigh };
 }
 
 // A cube map of half floats with its own levels. three.js' KTX2Loader reads compressed cubes only.
@@ -108,6 +129,14 @@ vec3 lookup${i}(vec3 p, vec3 d) {
       ${channels === 4 ? "" : `value${i}.a = 1.0;`}
       addShell(value${i}, light, transmittance);`);
   });
+  const { lightmap } = diffuse;
+  if (lightmap) {
+    for (const [name, value] of Object.entries(lightmap)) uniforms[name] = { value };
+    declarations.push("uniform sampler2D frontLight, backLight;\nuniform vec2 uvLow, uvHigh;");
+  }
+  const irradiance = lightmap
+    ? "(gl_FrontFacing ? textureLod(frontLight, at_, 0.0) : textureLod(backLight, at_, 0.0)).rgb"
+    : "(gl_FrontFacing ? irradiance_ : back_)";
   const { fresnel } = surface;
   const reflectance = {
     constant: () => "vec3(" + fresnel.r0 + ")",
@@ -122,19 +151,23 @@ vec3 lookup${i}(vec3 p, vec3 d) {
       ${diffuse.front ? "in vec3 _irradiance;" : "const vec3 _irradiance = vec3(0.0);"}
       ${diffuse.back ? "in vec3 _irradiance_back;" : ""}
       out vec3 position_, normal_, irradiance_, back_;
+      out vec2 uv_;
       void main() {
         position_ = (modelMatrix * vec4(position, 1.0)).xyz;
         normal_ = mat3(modelMatrix) * normal;
+        uv_ = uv;
         irradiance_ = _irradiance;
         back_ = ${diffuse.back ? "_irradiance_back" : "_irradiance"};
         gl_Position = projectionMatrix * viewMatrix * vec4(position_, 1.0);
       }`,
     fragmentShader: `
       in vec3 position_, normal_, irradiance_, back_;
+      in vec2 uv_;
       ${functions}
       ${declarations.join("\n")}
       void main() {
         vec3 normal = gl_FrontFacing ? normal_ : -normal_;
+        ${lightmap ? "vec2 at_ = (uv_ - uvLow) / (uvHigh - uvLow);" : ""}
         vec3 forward = -vec3(viewMatrix[0].z, viewMatrix[1].z, viewMatrix[2].z);
         const vec2 places[${places.length}] = vec2[](${places.map(([x, y]) => `vec2(${x.toFixed(6)}, ${y.toFixed(6)})`)});
         vec3 total = vec3(0.0);
@@ -146,7 +179,7 @@ vec3 lookup${i}(vec3 p, vec3 d) {
           float transmittance = 1.0;
           ${reads.join("\n")}
           vec3 f = ${reflectance};
-          vec3 body = (gl_FrontFacing ? irradiance_ : back_) * vec3(${surface.albedo}) * ${1 / Math.PI};
+          vec3 body = ${irradiance} * vec3(${surface.albedo}) * ${1 / Math.PI};
           total += f * light + ${surface.layers === "coated" ? "(1.0 - f) * body" : "body"};
         }
         gl_FragColor = vec4(total / ${places.length}.0, 1.0);

@@ -25,6 +25,7 @@ from mirrorbake.pem.export.mesh_file import has_border
 from mirrorbake.pem.opened import built_scene
 from mirrorbake.pem.store import PemStore
 from mirrorbake.scene.load import parse_config
+from unwrapped import write_post_on_plate
 from viewer_cases import case_scene, cases
 from web_tools import node_folder
 
@@ -41,7 +42,7 @@ SMALL = {
     "material": {"albedo": 0.3, "fresnel": "dielectric", "ior": 1.6},
     "views": {"count": 2, "degrees": 2.0, "size": [48, 48]},
     "maps": {"size": SIZE},
-    "layers": {"diffuse": True, "local": True, "hull_split": True},
+    "layers": {"diffuse": True, "lightmap": 0, "local": True, "hull_split": True},
     "trace": {"samples": 2, "indirect": "none"},
     "auto": {"quality": "draft"},
 }
@@ -408,6 +409,23 @@ f 4 5 1
 """
 
 
+UNWRAPPED_BOWL = """v -1 1 -1
+v 1 1 -1
+v 1 1 1
+v -1 1 1
+v 0 0 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+vt 0.5 0.5
+f 1/1 5/5 2/2
+f 2/2 5/5 3/3
+f 3/3 5/5 4/4
+f 4/4 5/5 1/1
+"""
+
+
 def test_a_bowl_of_dual_paraboloids_keeps_them_and_the_light_on_its_backs(tmp_path: Path) -> None:
     (tmp_path / "bowl.obj").write_text(BOWL)
     config = parse_config(
@@ -454,6 +472,47 @@ def test_a_bowl_of_dual_paraboloids_keeps_them_and_the_light_on_its_backs(tmp_pa
                 offset += 2 * s * s
                 bound = (expected + code["epsilon"]) * (2.0 ** (0.5 * step) - 1.0)
                 assert (np.abs(np.maximum(radiance, 0.0) - expected) <= 1.001 * bound + 1e-6).all()
+
+
+@pytest.mark.parametrize("name", ["plate", "bowl"])
+def test_a_lightmap_takes_the_place_of_the_light_at_the_vertices(name: str, tmp_path: Path) -> None:
+    mesh = tmp_path / f"{name}.obj"
+    if name == "plate":
+        write_post_on_plate(mesh)
+    else:
+        mesh.write_text(UNWRAPPED_BOWL)
+    config = parse_config(
+        {
+            "reflector": {"mesh": str(mesh), "parts": "joined"},
+            "material": {"albedo": 0.5, "fresnel": "schlick", "r0": [0.5, 0.5, 0.5]},
+            "views": {"count": 1, "size": [24, 24]},
+            "maps": {"size": 8},
+            "layers": {"diffuse": True, "lightmap": 16},
+            "trace": {"samples": 2, "indirect": "none"},
+            "auto": {"quality": "draft"},
+        },
+        name,
+    )
+    bake(config, tmp_path / "pem")
+    store = PemStore.open(tmp_path / "pem")
+    export_glb(store, built_scene(store), tmp_path / "lit.glb")
+    assert_valid(tmp_path / "lit.glb")
+    glb = Glb((tmp_path / "lit.glb").read_bytes())
+    jsonschema.validate(glb.extension, SCHEMA)
+    lightmap = glb.extension["lightmap"]
+    assert lightmap["size"] == 16
+    assert set(lightmap) == {"size", "low", "high", "front", *(["back"] if name == "bowl" else [])}
+    irradiance = store.read_irradiance()
+    assert irradiance is not None
+    assert irradiance.any()
+    np.testing.assert_array_equal(glb.accessor(lightmap["front"]), irradiance[:, :3])
+    if name == "bowl":
+        np.testing.assert_array_equal(glb.accessor(lightmap["back"]), irradiance[:, 3:])
+    for primitive in glb.primitives:
+        coordinates = glb.accessor(primitive["attributes"]["TEXCOORD_0"])
+        assert lightmap["low"] == coordinates.min(axis=0).tolist()
+        assert lightmap["high"] == coordinates.max(axis=0).tolist()
+        assert not any(attribute.startswith("_IRRADIANCE") for attribute in primitive["attributes"])
 
 
 def test_only_meshes_that_are_open_are_drawn_from_both_sides() -> None:

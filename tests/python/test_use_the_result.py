@@ -24,6 +24,7 @@ from mirrorbake.pem.export.maps import export_maps
 from mirrorbake.pem.opened import open_pem
 from mirrorbake.proxy import Proxy
 from mirrorbake.scene.load import parse_config
+from unwrapped import write_post_on_plate, write_sun
 from web_tools import node_folder, page_after_running
 
 if TYPE_CHECKING:
@@ -269,12 +270,32 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str
         thread.join()
 
 
-@pytest.mark.parametrize("infer", [{}, {"fit": "layers"}], ids=["display", "layers"])
+def plate_with_lightmap(folder: Path) -> dict[str, Any]:
+    """A scene whose diffuse light has a shadow, which lies in a lightmap."""
+    write_post_on_plate(folder / "plate.obj")
+    write_sun(folder / "sky.exr")
+    return {
+        "reflector": {"mesh": str(folder / "plate.obj"), "parts": "joined"},
+        "surroundings": {"panorama": str(folder / "sky.exr")},
+        "material": {
+            "albedo": [0.7, 0.6, 0.5],
+            "ior": [1.5] * 3,
+            "fresnel": "dielectric",
+            "layers": "coated",
+        },
+        "layers": {"local": True, "diffuse": True, "lightmap": 64},
+    }
+
+
+@pytest.mark.parametrize("kind", ["display", "layers", "lightmap"])
 def test_the_three_js_example_draws_what_the_library_draws(
-    infer: dict[str, Any], served: tuple[Path, str], tmp_path: Path
+    kind: str, served: tuple[Path, str], tmp_path: Path
 ) -> None:
     folder, address = served
-    bake(parse_config({**SMALL, "infer": infer}, "small"), tmp_path / "pem")
+    own: dict[str, Any] = {"infer": {"fit": "layers"}} if kind == "layers" else {}
+    if kind == "lightmap":
+        own = plate_with_lightmap(tmp_path)
+    bake(parse_config({**SMALL, **own}, "small"), tmp_path / "pem")
     pem = open_pem(tmp_path / "pem")
     built, store = pem.stage.built, pem.store
     export_maps([static_set(store), sample_set(store, 0)], folder / "maps", run_time=run_time_of(store))

@@ -255,6 +255,31 @@ def test_irradiance_that_changes_is_written_for_every_sample() -> None:
     assert np.abs(read[0] - read[2]).max() > 0.1
 
 
+@pytest.mark.parametrize("name", ["lightmap", "lightmap-open-moving"])
+def test_a_lightmap_is_written_texel_by_texel_with_the_coordinates_that_read_it(name: str) -> None:
+    case = next(case for case in cases() if case.name == name)
+    scene = case_scene(case)
+    web = WebPem(case_source(case, scene, CasePem()), WebOptions())
+    manifest = json.loads(web.read("manifest.json"))
+    mesh = manifest["mesh"]
+    assert mesh["lightmap"] == case.lightmap
+    assert mesh["arrays"]["uvs"]["count"] == mesh["arrays"]["positions"]["count"]
+    # The library's map lies on the bounds of all vertices, whether a triangle uses them or not.
+    ours = scene.mesh.uvs * [1.0, -1.0] + [0.0, 1.0]
+    np.testing.assert_allclose(mesh["uvBounds"]["low"], ours.min(axis=0), atol=1e-6)
+    np.testing.assert_allclose(mesh["uvBounds"]["high"], ours.max(axis=0), atol=1e-6)
+    array = mesh["arrays"]["irradiance"]
+    assert (array["count"], array["components"]) == (case.lightmap**2, 6 if case.open else 3)
+    # Rows from the top, as they are stored; the cases' texels are half floats.
+    read = read_array(gzip.decompress(web.read(mesh["file"])), array)
+    np.testing.assert_array_equal(read, scene.mesh.irradiance)
+    for k, sample in enumerate(manifest["samples"]):
+        assert (sample["irradiance"] is not None) == case.moves
+        if case.moves:
+            own = read_array(gzip.decompress(web.read(sample["irradiance"])), {**array, "offset": 0})
+            np.testing.assert_array_equal(own, irradiance(case, scene.mesh.normals, k))
+
+
 def test_vertices_that_no_triangle_uses_are_left_out() -> None:
     mesh = ReflectorMesh(
         positions=np.array([[9, 9, 9], [0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32),
@@ -274,7 +299,7 @@ def test_vertices_that_no_triangle_uses_are_left_out() -> None:
     assert "normals" not in layout["arrays"]
 
 
-@pytest.mark.parametrize("name", ["infinite", "shells", "fading", "box-paraboloid"])
+@pytest.mark.parametrize("name", ["infinite", "shells", "fading", "box-paraboloid", "lightmap"])
 def test_the_manifest_names_every_file_and_no_other(name: str, scene: Scene) -> None:
     case = next(case for case in cases() if case.name == name)
     web = WebPem(case_source(case, scene, CasePem(case.projection)), WebOptions())

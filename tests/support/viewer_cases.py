@@ -75,6 +75,8 @@ class Case:
     """The ball is a bowl without thickness, whose inner side gets light of its own."""
     trimmed: bool = False
     """Of a sample's texels every second half face alone are its own; the static set has the others."""
+    lightmap: int = 0
+    """Texels along a side of the map on texture coordinates that irradiance is; 0: it is at the vertices."""
 
 
 MAPS = (4, 3, 3, 4)
@@ -167,6 +169,16 @@ def _cube_cases() -> list[Case]:
             open=True,
         ),
         Case("trimmed", _core.Proxy.infinite(origin), local, schlick, trimmed=True, fade_degrees=10.0),
+        Case("lightmap", _core.Proxy.infinite(origin), local, schlick, lightmap=16),
+        Case(
+            "lightmap-open-moving",
+            _core.Proxy.box((0, 1, 0), (2.0, 1.1, 1.5), origin, straight),
+            turned_local,
+            schlick,
+            moves=True,
+            open=True,
+            lightmap=32,
+        ),
         Case("fading", _core.Proxy.infinite(origin), local, schlick, fade_degrees=10.0),
     ]
 
@@ -286,6 +298,10 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
         material.specular_texture = use(mirrored, offset=(0.3, 0.1))
         material.normal_texture = use(scene.add_texture(_bumps()))
         material.colors_tint_reflectance = True
+    if case.lightmap:
+        # More than a tile, and the most of it where the open ball has vertices that no triangle uses.
+        x, y, z = positions.T
+        uvs = np.stack([0.3 + 4.0 * x, 2.0 * z + 4.0 * y - 0.5], axis=1).astype(np.float32)
     pose = _pose(case, t)
     mesh = _core.TriangleMesh(
         pose.moved(positions.astype(np.float64)).astype(np.float32),
@@ -312,12 +328,20 @@ def case_scene(case: Case, t: float = 0.0) -> Scene:
         np.zeros((0, 4), np.float32) if tangents is None else tangents,
         np.zeros(len(triangles), np.uint16),
         irradiance(case, normals, 0),
+        case.lightmap,
     )
     return Scene(_core.Tracer(scene, _core.TracerOptions()), exported, export_materials(scene, [number]))
 
 
 def irradiance(case: Case, normals: FloatArray, sample: int) -> FloatArray:
-    """Of the vertices in a sample: light from above, which turns blue on the way; red light on backs."""
+    """Of the vertices in a sample: light from above, which turns blue on the way; red light on backs.
+
+    Of a lightmap the texels: colours of their own, no two alike.
+    """
+    if case.lightmap:
+        random = np.random.default_rng(1000 + (sample if case.moves else 0))
+        texels = random.uniform(0.0, 3.0, (case.lightmap**2, 6 if case.open else 3))
+        return texels.astype(np.float16).astype(np.float32)
     share = sample / (len(PARAMETERS) - 1) if case.moves else 0.0
     colour = np.array([1.0, 0.8, 0.6]) * (1.0 - share) + np.array([0.3, 0.5, 1.0]) * share
     values: FloatArray = ((0.5 + 0.5 * normals[:, 1:2]) * colour).astype(np.float32)
@@ -452,7 +476,10 @@ def reference(case: Case, pem: CasePem, code: RadianceCode, t: float, raised: fl
         parts[1] = [distant]
     normals = scene.mesh.normals
     here = irradiance(case, normals, first) * (1 - weight) + irradiance(case, normals, first + 1) * weight
-    body = BodyLight(scene.mesh.triangles, scene.mesh.uvs)
+    uvs = scene.mesh.uvs
+    if case.lightmap:
+        uvs = (uvs - uvs.min(axis=0)) / np.ptp(uvs, axis=0)
+    body = BodyLight(scene.mesh.triangles, uvs, case.lightmap)
     diffuse = body.radiance(samples, here.astype(np.float32))
     return _core.render_reflector(samples, parts, diffuse, case.run_time)
 

@@ -1,9 +1,10 @@
-"""A small baked PEM for the tests of the page, with ray tracing and the C++ renderer beside it.
+"""Small baked PEMs for the tests of the page, with ray tracing and the C++ renderer beside them.
 
     python tests/support/viewer_traced.py OUT
 
-writes the web exports `traced-exact` and `traced-avif`, with a `reference.json` beside `reference-K.f32`: ray
-traced pictures, float32 RGBA from the top left corner with 1 in alpha where all of a pixel is the object.
+writes the web exports `traced-exact` and `traced-avif` of a teapot and `traced-lightmap` of a plate with a
+shadow, with a `reference.json` beside `reference-K.f32`: ray traced pictures, float32 RGBA from the top left
+corner with 1 in alpha where all of a pixel is the object.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from mirrorbake.pem.export.web import WebOptions, WebPem
 from mirrorbake.pem.opened import OpenedPem, open_pem
 from mirrorbake.scene.load import parse_config
 from mirrorbake.viewer.export import write_folder
+from unwrapped import write_post_on_plate, write_sun
 
 CONFIG = {
     "reflector": {"object": "teapot", "subdivisions": 8, "parts": "split"},
@@ -34,6 +36,16 @@ CONFIG = {
     "trace": {"samples": 32, "indirect": "none"},
     "static": {"views": 3},
     "auto": {"quality": "draft"},
+}
+LIT = {
+    **CONFIG,
+    "material": {
+        "ior": [1.5] * 3,
+        "fresnel": "dielectric",
+        "albedo": [0.7, 0.6, 0.5],
+        "layers": "coated",
+    },
+    "layers": {"lightmap": 64},
 }
 REFERENCE_SAMPLES = 64
 POINTS = (0.5, 0.25)
@@ -74,17 +86,27 @@ def write_pictures(pem: OpenedPem, folders: list[Path]) -> None:
         (folder / "reference.json").write_text(json.dumps(description))
 
 
-def main(out: Path) -> None:
-    folders = [out / "traced-exact", out / "traced-avif"]
+def write_pem(config: dict[str, Any], folders: list[Path]) -> None:
+    """Bake, and export, exactly where the folder's name does not say otherwise."""
     with tempfile.TemporaryDirectory() as scratch:
-        bake(parse_config(CONFIG, "traced"), Path(scratch) / "pem")
+        bake(parse_config(config, "traced"), Path(scratch) / "pem")
         pem = open_pem(Path(scratch) / "pem")
         source = export_source(pem)
         for folder in folders:
-            image_format = ImageFormat(exact=folder is folders[0])
+            image_format = ImageFormat(exact=not folder.name.endswith("avif"))
             web = WebPem(source, WebOptions(image_format, fallback=False))
             write_folder(web, "traced", folder, lambda done, total, text: None)
         write_pictures(pem, folders)
+
+
+def main(out: Path) -> None:
+    write_pem(CONFIG, [out / "traced-exact", out / "traced-avif"])
+    with tempfile.TemporaryDirectory() as folder:
+        mesh, sky = Path(folder) / "plate.obj", Path(folder) / "sky.exr"
+        write_post_on_plate(mesh)
+        write_sun(sky)
+        scene = {"reflector": {"mesh": str(mesh)}, "surroundings": {"panorama": str(sky)}}
+        write_pem({**LIT, **scene}, [out / "traced-lightmap"])
 
 
 if __name__ == "__main__":

@@ -75,7 +75,7 @@ export interface Sample {
   /// File that says which blocks of its images are the sample's own; all others are the static set's. null: all are its own.
   blocks: string | null;
   still: string | null;
-  /// File of the vertices' irradiance, if it changes from sample to sample.
+  /// File of the irradiance, as the mesh has it, if it changes from sample to sample.
   irradiance: string | null;
 }
 
@@ -134,6 +134,8 @@ export interface Manifest {
     uvBounds?: { low: [number, number]; high: [number, number] };
     arrays: { [name: string]: MeshArray };
     ranges: Range[];
+    /// Texels along a side of the map on the texture coordinates that irradiance is; null: it is at the vertices.
+    lightmap: number | null;
     bytes: number;
   };
   projection: Projection;
@@ -151,7 +153,7 @@ export interface Manifest {
   first: number;
 }
 
-const VERSION = 5;
+const VERSION = 6;
 
 const LARGEST_MESH = 1 << 30;
 
@@ -248,6 +250,29 @@ function checkMesh(data: Manifest): void {
         isIndex(range.stacked, range.count + 1),
     );
   if (!valid) damaged("the mesh has other parts");
+  checkIrradiance(data);
+}
+
+function checkIrradiance(data: Manifest): void {
+  const { lightmap, arrays, uvBounds } = data.mesh;
+  const { irradiance, positions, uvs } = arrays;
+  const isPair = (pair: unknown) => Array.isArray(pair) && pair.length === 2 && pair.every(Number.isFinite);
+  if (uvs && !(isPair(uvBounds?.low) && isPair(uvBounds?.high)))
+    damaged("the mesh's texture coordinates have no bounds");
+  if (lightmap !== null) {
+    if (!isSize(lightmap)) damaged(`the size of the lightmap is ${lightmap}`);
+    if (!irradiance) damaged("the mesh has a lightmap without texels");
+    if (!uvs) damaged("the mesh has a lightmap and no texture coordinates");
+  }
+  const texels = lightmap === null ? positions.count : lightmap ** 2;
+  const isWhole =
+    irradiance?.type === "float16" &&
+    irradiance.count === texels &&
+    (irradiance.components === 3 || irradiance.components === 6);
+  if (irradiance && !isWhole) damaged("the mesh's irradiance is not described");
+  const count = data.samples.filter((sample) => sample.irradiance !== null).length;
+  if (count !== 0 && !(irradiance && count === data.samples.length))
+    damaged("an irradiance is missing that others have");
 }
 
 const MOST_PARTS = 65535;
@@ -300,6 +325,11 @@ function checkCamera(data: Manifest): void {
   if (!valid) damaged("it has no camera");
 }
 
+/// Whether the irradiance changes from sample to sample.
+export function irradianceChanges(manifest: Manifest): boolean {
+  return manifest.samples[0].irradiance !== null;
+}
+
 /// How many sides of the mesh have an irradiance of their own: 2 where light reaches the backs of its triangles.
 export function litSides(manifest: Manifest): number {
   return (manifest.mesh.arrays.irradiance?.components ?? 3) / 3;
@@ -349,8 +379,7 @@ function checkFiles(data: Manifest): void {
       isIndex(array.count, LARGEST_MESH) &&
       isIndex(array.offset, LARGEST_MESH),
   );
-  const irradiance = mesh.arrays.irradiance?.components ?? 3;
-  if (!arrays || (irradiance !== 3 && irradiance !== 6)) damaged("the mesh is not described");
+  if (!arrays) damaged("the mesh is not described");
   const moves =
     motion === null || (isVector(motion?.to) && isVector(motion.pivot) && Number.isFinite(motion.turn));
   if (!moves) damaged("the object's motion is not described");

@@ -10,7 +10,8 @@ export interface Mesh {
   colors: Uint16Array | null;
   /// Of each vertex the direction of u on an octahedron and the sign of the bitangent, or zeros.
   tangents: Int16Array | null;
-  /// Half floats: three for each vertex, or six with those of the back.
+  /// Half floats: three for each vertex, or six with those of the back. Of a lightmap three for each texel of the fronts, then
+  /// for each of the backs.
   irradiance: Uint16Array | null;
   indices: Uint32Array;
 }
@@ -70,19 +71,32 @@ export async function decodeMesh(file: ArrayBuffer, mesh: Manifest["mesh"]): Pro
     uvs: uvs ? summed(new Uint16Array(gather(payload, uvs)), 2) : null,
     colors: colors ? summed(new Uint16Array(gather(payload, colors)), 3) : null,
     tangents: tangents ? summed(new Int16Array(gather(payload, tangents)), 3) : null,
-    irradiance: irradiance ? new Uint16Array(gather(payload, irradiance)) : null,
+    irradiance: irradiance
+      ? mesh.lightmap === null
+        ? new Uint16Array(gather(payload, irradiance))
+        : sidesApart(payload, irradiance, irradiance.count)
+      : null,
     indices: result,
   };
 }
 
-/// The irradiance of a sample's vertices, three half floats for each of `count`, filled up to `padded` vertices; with two `sides`
-/// that of the fronts first, then that of the backs.
+/// Irradiance of three half floats for each vertex or texel of the fronts, filled up to `padded` of them, then of the backs.
+function sidesApart(payload: Uint8Array, array: MeshArray, padded: number): Uint16Array {
+  const { components, count, offset } = array;
+  const values = new Uint16Array(components * padded);
+  for (let side = 0; side < components / 3; ++side) {
+    const own: MeshArray = { type: "float16", components: 3, count, offset: offset + 6 * side * count };
+    values.set(new Uint16Array(gather(payload, own)), 3 * side * padded);
+  }
+  return values;
+}
+
+/// The irradiance of a sample, which is one like the mesh's `array`, with the sides apart.
 export async function decodeIrradiance(
   name: string,
   file: ArrayBuffer,
-  count: number,
+  array: MeshArray,
   padded: number,
-  sides: number,
 ): Promise<Uint16Array> {
   const damaged = new UserError(
     "damaged",
@@ -94,11 +108,6 @@ export async function decodeIrradiance(
   } catch {
     throw damaged;
   }
-  if (payload.length !== 6 * sides * count) throw damaged;
-  const values = new Uint16Array(3 * sides * padded);
-  for (let side = 0; side < sides; ++side) {
-    const array: MeshArray = { type: "float16", components: 3, count, offset: 6 * side * count };
-    values.set(new Uint16Array(gather(payload, array)), 3 * side * padded);
-  }
-  return values;
+  if (payload.length !== 2 * array.components * array.count) throw damaged;
+  return sidesApart(payload, { ...array, offset: 0 }, padded);
 }

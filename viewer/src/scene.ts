@@ -6,9 +6,9 @@ import { type Decoded, type DecodeRequest, Decoder, sameColours } from "./decode
 import { UserError } from "./errors";
 import { degreesOutside, fadeWeight } from "./fade";
 import { type Files, textOf } from "./files";
-import { irradianceTexels } from "./gl/map_pool";
+import { irradianceSize } from "./gl/irradiance";
 import { type FrameState, Renderer } from "./gl/renderer";
-import { type Axis, litSides, type Manifest, type MapFiles, parseManifest, type Vec3 } from "./manifest";
+import { type Axis, type Manifest, type MapFiles, parseManifest, type Vec3 } from "./manifest";
 import {
   add,
   type ImageWindow,
@@ -351,9 +351,9 @@ export class Scene {
   private async loadIrradiance(file: string, slot: number): Promise<void> {
     const { renderer, manifest } = this;
     const bytes = await this.files.read(file);
-    const { count } = manifest.mesh.arrays.positions;
-    const values = await decodeIrradiance(file, bytes, count, irradianceTexels(manifest), litSides(manifest));
-    if (renderer === this.renderer) renderer.pool.uploadIrradiance(slot, values);
+    const { width, height } = irradianceSize(manifest);
+    const values = await decodeIrradiance(file, bytes, manifest.mesh.arrays.irradiance, width * height);
+    if (renderer === this.renderer) renderer.pool.irradiance.upload(slot, values);
   }
 
   private async loadSample(sample: number, slot: number): Promise<void> {

@@ -2,12 +2,13 @@
 
 import { layerSize } from "../atlas";
 import { UserError } from "../errors";
-import { litSides, type Manifest, type Range, shellNames } from "../manifest";
+import { irradianceChanges, litSides, type Manifest, type Range, shellNames } from "../manifest";
 import type { View } from "../math";
 import type { Mesh } from "../mesh";
 import { nodeCount } from "../space";
 import * as images from "./image_shaders";
-import { IRRADIANCE_UNIT, MapPool } from "./map_pool";
+import { IRRADIANCE_UNIT } from "./irradiance";
+import { MapPool } from "./map_pool";
 import { type Counters, Program } from "./program";
 import { type Motion, Proxies } from "./proxies";
 import * as shaders from "./shaders";
@@ -87,6 +88,8 @@ export class Renderer {
   /// Number of a map among those that have an α; -1: it has none.
   private readonly alphaOf: number[];
   private readonly flat: boolean;
+  /// Of the lightmap at rest; null: irradiance is at the vertices.
+  private readonly restSlot: number | null;
   private stillTexture: WebGLTexture | null = null;
 
   constructor(
@@ -109,6 +112,7 @@ export class Renderer {
     this.alphaOf = manifest.maps.map((map) => (map.opaque ? -1 : alphas++));
     this.motion = { cosine: 1, sine: 0, pivot: manifest.motion?.pivot ?? ORIGIN, offset: ORIGIN };
     this.pool = new MapPool(gl, manifest, budget, this.nodes, this.counters);
+    this.restSlot = this.pool.irradiance.restSlot;
     this.targets = new Targets(gl, this.counters);
     for (const part of manifest.parts) this.meshProgram(part.shells.length);
     this.background = new Program(
@@ -122,6 +126,8 @@ export class Renderer {
     this.display = new Program(gl, images.FULL_VERTEX, images.DISPLAY_FRAGMENT, this.counters);
     this.empty = gl.createVertexArray();
     this.vertices = this.uploadMesh(mesh);
+    if (this.restSlot !== null && mesh.irradiance)
+      this.pool.irradiance.upload(this.restSlot, mesh.irradiance);
     this.flat = mesh.normals === null;
     this.surfaces = new Surfaces(gl, manifest, this.counters);
     this.staticProxy = new Proxies([manifest.static.proxy], [false]);
@@ -147,7 +153,12 @@ export class Renderer {
       program = new Program(
         this.gl,
         shaders.meshVertex(this.nodes),
-        shaders.meshFragment(shells, this.mixture.length, this.manifest.projection),
+        shaders.meshFragment(
+          shells,
+          this.mixture.length,
+          this.manifest.projection,
+          this.restSlot === null ? 0 : this.nodes,
+        ),
         this.counters,
       );
       this.meshPrograms.set(shells, program);
@@ -175,7 +186,7 @@ export class Renderer {
     };
     attribute(0, mesh.positions as BufferSource, 3, gl.UNSIGNED_SHORT, true);
     if (mesh.normals) attribute(1, mesh.normals as BufferSource, 2, gl.SHORT, true);
-    if (mesh.irradiance) {
+    if (mesh.irradiance && this.restSlot === null) {
       const sides = litSides(this.manifest);
       attribute(2, mesh.irradiance as BufferSource, 3, gl.HALF_FLOAT, false, 6 * sides);
       // The same buffer again: what the backs have of their own, or the fronts' where there is nothing.
@@ -359,6 +370,11 @@ export class Renderer {
     for (const part of this.parts) part.proxies.move(this.motion);
   }
 
+  /// Whether irradiance is that of the blended samples, not that at rest.
+  private isLitBySamples(frame: FrameState): boolean {
+    return irradianceChanges(this.manifest) && frame.hasSamples;
+  }
+
   /// The shares of the blended samples and of the static set.
   private mix(frame: FrameState): void {
     const fade = frame.hasSet ? (frame.hasSamples ? frame.fade : 0) : 1;
@@ -368,6 +384,11 @@ export class Renderer {
       this.mixture[n] = fade * frame.weights[n];
     }
     if (this.mixture.length > this.nodes) this.mixture[this.nodes] = 1 - fade;
+    const { restSlot } = this;
+    if (restSlot === null || this.isLitBySamples(frame)) return;
+    this.weights.fill(0);
+    this.weights[0] = 1;
+    this.slots.fill(restSlot);
   }
 
   private drawRange(frame: FrameState, content: Content, place: [number, number], range: Range): void {
@@ -430,7 +451,8 @@ export class Renderer {
     gl.uniform1i(program.at("uCaptured"), content === "pem" && hasMaps ? 0 : 1);
     gl.uniform1i(program.at("uIrradiance"), IRRADIANCE_UNIT);
     gl.uniform1i(program.at("uSides"), litSides(manifest));
-    gl.uniform1i(program.at("uIrradianceChanges"), pool.hasIrradiance && frame.hasSamples ? 1 : 0);
+    const changes = this.restSlot === null && this.isLitBySamples(frame);
+    gl.uniform1i(program.at("uIrradianceChanges"), changes ? 1 : 0);
     gl.uniform1fv(program.at("uSlot"), this.slots);
     this.surfaces.set(program, range.material, frame.fresnelOn, frame.diffuseOn);
     // Triangles that carry all shells, then those on the hull.

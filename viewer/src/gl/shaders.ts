@@ -3,6 +3,7 @@
 
 import { PROJECTIONS, type Projection } from "../projection";
 import { EXITS } from "../proxy";
+import { IRRADIANCE_ROW, LIGHTMAP_READS } from "./irradiance";
 
 export const HEADER = `#version 300 es
 precision highp float;
@@ -10,9 +11,6 @@ precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
 `;
-
-/// Vertices of a row of the texture that holds irradiance.
-export const IRRADIANCE_ROW = 1024;
 
 export function meshVertex(nodes: number): string {
   return `${HEADER}
@@ -169,15 +167,24 @@ export function reads(projection: Projection): string {
   return `${MAPS}${PROJECTIONS[projection].glsl}${TAPS}`;
 }
 
-/// `shells` of the part and the number of samples that are `mixed`, the static set among them, are constants of the program.
-export function meshFragment(shells: number, mixed: number, projection: Projection): string {
+/// `shells` of the part and the number of samples that are `mixed`, the static set among them, are constants of the program, and
+/// so is of how many nodes a `lightmap` is blended: 0: there is none, and irradiance comes from the vertices.
+export function meshFragment(
+  shells: number,
+  mixed: number,
+  projection: Projection,
+  lightmap: number,
+): string {
   return `${HEADER}
 #define SHELLS ${shells}
 #define MIXED ${mixed}
+#define LIGHTMAP ${lightmap}
 in vec3 vPosition;
 in vec3 vNormal;
+#if LIGHTMAP == 0
 in vec3 vIrradiance;
 in vec3 vBackIrradiance;
+#endif
 in vec2 vUv;
 in vec3 vColor;
 in vec4 vTangent;
@@ -225,6 +232,9 @@ uniform mat3x2 uReflectanceFromUv;
 uniform mat3x2 uNormalFromUv;
 
 ${EXITS}
+#if LIGHTMAP > 0
+${LIGHTMAP_READS}
+#endif
 vec3 lookupDirection(int shell, vec3 p, vec3 d) {
   return leave(
     uShape[shell], p, d, uCentre[shell], uProxyFromWorld[shell], uShapeSize[shell], uOrigin[shell]
@@ -341,8 +351,10 @@ void main() {
   vec3 nx = dFdx(vNormal), ny = dFdy(vNormal);
   vec4 tx = dFdx(vTangent), ty = dFdy(vTangent);
   vec2 ux = dFdx(vUv), uy = dFdy(vUv);
+#if LIGHTMAP == 0
   vec3 reached = gl_FrontFacing ? vIrradiance : vBackIrradiance;
   vec3 ix = dFdx(reached), iy = dFdy(reached);
+#endif
   float e11 = dot(px, px), e12 = dot(px, py), e22 = dot(py, py);
   float determinant = e11 * e22 - e12 * e12;
   vec3 g = cross(px, py);
@@ -365,7 +377,11 @@ void main() {
   vec3 normal = vNormal + pixels.x * nx + pixels.y * ny;
   vec4 tangent = vTangent + pixels.x * tx + pixels.y * ty;
   vec2 uv = vUv + pixels.x * ux + pixels.y * uy;
+#if LIGHTMAP == 0
   vec3 irradiance = max(reached + pixels.x * ix + pixels.y * iy, 0.0);
+#else
+  vec3 irradiance = irradianceAt(uv);
+#endif
 
   vec3 toEye = uEye - position;
   float range = length(toEye);

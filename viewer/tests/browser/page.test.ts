@@ -21,6 +21,19 @@ function settings(page: Page) {
   return page.evaluate(() => ({ ...window.mirrorbake.settings }));
 }
 
+/// Takes the graphics context away for a moment.
+function loseContext(page: Page) {
+  return page.evaluate(async () => {
+    const gl = window.mirrorbake.scene?.renderer.gl;
+    const extension = gl?.getExtension("WEBGL_lose_context");
+    extension?.loseContext();
+    await new Promise((resolve) => setTimeout(resolve, 200));
+    const restored = new Promise((resolve) => gl?.canvas.addEventListener("webglcontextrestored", resolve));
+    extension?.restoreContext();
+    await restored;
+  });
+}
+
 describe("controls", () => {
   let opened: Opened;
   beforeAll(async () => {
@@ -292,12 +305,7 @@ describe("controls", () => {
         return scene ? Array.from(scene.readLinear(settings, 40, 30)) : [];
       });
     const before = await picture();
-    await page.evaluate(async () => {
-      const extension = window.mirrorbake.scene?.renderer.gl.getExtension("WEBGL_lose_context");
-      extension?.loseContext();
-      await new Promise((resolve) => setTimeout(resolve, 200));
-      extension?.restoreContext();
-    });
+    await loseContext(page);
     await page.waitForFunction(() => window.mirrorbake.scene?.cache.ready === 3, undefined, {
       timeout: 20000,
     });
@@ -370,6 +378,43 @@ test("until the first sample is there the object is drawn from the static map", 
   await context.close();
   own.server.close();
 });
+
+test("a lightmap is that at rest until a sample is there, and comes back after a lost context", async () => {
+  const own = await serve(join(CASES, "lightmap-open-moving"));
+  own.delays.set("samples/", 3000);
+  const { page, context, errors } = await open(browser, own.url, {
+    ...small,
+    until: () => window.mirrorbake.frames > 0,
+  });
+  /// The light of the body alone, at the first sample, whose lightmap is that at rest.
+  const body = () =>
+    page.evaluate(() => {
+      const { scene, settings } = window.mirrorbake;
+      if (!scene) throw new Error("no scene");
+      const s = { ...settings, ...scene.at(settings, scene.manifest.axes[0], 0) };
+      scene.prepare(s, [0]);
+      const [lit, dark] = [true, false].map((diffuse) => scene.readLinear({ ...s, diffuse }, 64, 48));
+      return { share: scene.cache.share, light: Array.from(lit, (value, i) => value - dark[i]) };
+    });
+  const ready = () =>
+    page.waitForFunction(() => window.mirrorbake.scene?.cache.ready === 3, undefined, { timeout: 20000 });
+  const atRest = await body();
+  expect(atRest.share).toBe(0);
+  expect(Math.max(...atRest.light)).toBeGreaterThan(0.1);
+  await ready();
+  const ofSample = await body();
+  expect(ofSample.share).toBe(1);
+  // Half floats of what is reflected besides.
+  for (let i = 0; i < atRest.light.length; ++i) expect(ofSample.light[i]).toBeCloseTo(atRest.light[i], 2);
+  own.delays.clear();
+  await loseContext(page);
+  await ready();
+  await settle(page);
+  expect((await body()).light).toEqual(ofSample.light);
+  expect(errors).toEqual([]);
+  await context.close();
+  own.server.close();
+}, 120000);
 
 test("a PEM shows the controls that it has a use for, and names its sliders where there are several", async () => {
   const own = await serve(join(CASES, "infinite"));

@@ -149,6 +149,14 @@ describe("the page's pixels against the C++ renderer", () => {
     for (const figure of figures) expect(figure).toBeGreaterThan(LEAST_DB);
   });
 
+  for (const name of ["lightmap", "lightmap-open-moving"]) {
+    test(`are the same with a map of the body's light, in the case ${name}`, async () => {
+      const figures = await compare(name);
+      console.log(name, figures.map((f) => f.toFixed(1)).join(" "), "dB");
+      for (const figure of figures) expect(figure).toBeGreaterThan(LEAST_DB);
+    });
+  }
+
   test("are put together of a sample's own blocks and the static set's", async () => {
     const figures = await compare("trimmed");
     console.log("trimmed", figures.map((f) => f.toFixed(1)).join(" "), "dB");
@@ -166,7 +174,7 @@ describe("the page's pixels against the C++ renderer", () => {
 
 describe("the page's pixels against ray tracing", () => {
   // What the specification allows: the rasteriser's grid at silhouettes, and what the image codec loses.
-  for (const name of ["traced-exact", "traced-avif"]) {
+  for (const name of ["traced-exact", "traced-avif", "traced-lightmap"]) {
     test(`are at most 0.3 dB below the C++ renderer's in the case ${name}`, async () => {
       const figures = await compare(name);
       const { pictures } = referenceOf(name);

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { UserError } from "../../src/errors";
-import { type Manifest, parseManifest, shellNames } from "../../src/manifest";
+import { irradianceChanges, type Manifest, parseManifest, shellNames } from "../../src/manifest";
 
 const infinite = { shape: "infinite", origin: [0, 0, 0] };
 const box = {
@@ -21,7 +21,7 @@ const array = (components: number, count: number, offset: number) => ({
   offset,
 });
 
-/// A manifest as web.py writes it, of two samples, three shells and a static set.
+/// A manifest as web.py writes it, of two samples, three shells, a static set and a lightmap.
 function sound() {
   return structuredClone(written());
 }
@@ -34,7 +34,7 @@ function written() {
   ];
   return {
     format: "mirrorbake-web",
-    version: 5,
+    version: 6,
     library: "0.1.0",
     title: "teapot",
     notes: [],
@@ -79,9 +79,16 @@ function written() {
     mesh: {
       file: "mesh.bin.gz",
       bounds: { low: [0, 0, 0], high: [1, 1, 1] },
-      arrays: { positions: array(3, 9, 0), indices: { ...array(1, 9, 54), type: "int32" } },
+      uvBounds: { low: [0, 0], high: [1, 1] },
+      arrays: {
+        positions: array(3, 9, 0),
+        indices: { ...array(1, 9, 54), type: "int32" },
+        uvs: array(2, 9, 90),
+        irradiance: { ...array(6, 64, 126), type: "float16" },
+      },
       ranges: [{ part: 0, material: 0, start: 0, stacked: 1, count: 3 }],
-      bytes: 90,
+      lightmap: 8,
+      bytes: 894,
     },
     projection: "paraboloid",
     maps: [
@@ -106,7 +113,7 @@ function written() {
       maps: maps(`samples/0000${k}`),
       blocks: null,
       still: `samples/0000${k}/still`,
-      irradiance: null,
+      irradiance: `samples/0000${k}/irradiance.bin.gz`,
     })),
     first: 1,
   };
@@ -167,6 +174,7 @@ const NAMES: Path[] = [
   ["samples", 0, "maps", 0, "alpha"],
   ["samples", 1, "still"],
   ["samples", 1, "blocks"],
+  ["samples", 0, "irradiance"],
   ["static", "image"],
   ["static", "maps", 1, "radiance"],
   ["textures", 0, "image"],
@@ -194,4 +202,35 @@ test("sizes that no map can have are refused", () => {
     holderOf(other, ["static", "size"]).size = size;
     expect(() => parse(other)).toThrow(/damaged/);
   }
+});
+
+test("a lightmap has a size, as many texels as that, and coordinates to be read at", () => {
+  const refused = (change: (mesh: Manifest["mesh"]) => void, sentence: RegExp) => {
+    const data = sound();
+    change(data.mesh as unknown as Manifest["mesh"]);
+    expect(() => parse(data)).toThrow(sentence);
+  };
+  expect(parse(sound()).mesh.lightmap).toBe(8);
+  for (const size of [0, 7, -8, 8192, 0.5, "8", undefined]) {
+    refused((mesh) => Object.assign(mesh, { lightmap: size }), /the size of the lightmap is/);
+  }
+  refused((mesh) => Object.assign(mesh, { lightmap: 16 }), /irradiance is not described/);
+  refused((mesh) => Object.assign(mesh.arrays.irradiance, { count: 63 }), /irradiance is not described/);
+  refused((mesh) => Object.assign(mesh.arrays.irradiance, { components: 4 }), /irradiance is not described/);
+  refused((mesh) => Object.assign(mesh.arrays.irradiance, { type: "int16" }), /irradiance is not described/);
+  refused((mesh) => delete mesh.arrays.irradiance, /a lightmap without texels/);
+  refused((mesh) => delete mesh.arrays.uvs, /a lightmap and no texture coordinates/);
+  refused((mesh) => delete mesh.uvBounds, /coordinates have no bounds/);
+  // At the vertices there is one for each.
+  refused((mesh) => Object.assign(mesh, { lightmap: null }), /irradiance is not described/);
+});
+
+test("the irradiance changes in all samples or in none", () => {
+  const none = sound();
+  for (const sample of none.samples) Object.assign(sample, { irradiance: null });
+  expect(irradianceChanges(parse(none))).toBe(false);
+  expect(irradianceChanges(parse(sound()))).toBe(true);
+  const some = sound();
+  Object.assign(some.samples[1], { irradiance: null });
+  expect(() => parse(some)).toThrow(/an irradiance is missing/);
 });

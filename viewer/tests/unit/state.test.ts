@@ -48,7 +48,7 @@ test("a link without sense changes nothing", () => {
   expect(fromLink("#az=x&d=NaN&compare=moon&shells=&ev=Infinity&theme=pink", home)).toEqual(home);
 });
 
-test.each(["{", "{}", "null", '{"format":"mirrorbake-web","version":5}'])(
+test.each(["{", "{}", "null", '{"format":"mirrorbake-web","version":6}'])(
   "the manifest %s is refused with a sentence",
   (text) => {
     expect(() => parseManifest(text)).toThrow(/manifest\.json is damaged/);

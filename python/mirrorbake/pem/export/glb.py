@@ -25,13 +25,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.export.map_sets import MapSet, ShellMap
     from mirrorbake.pem.export.materials import Materials
     from mirrorbake.pem.store import PemStore
     from mirrorbake.scene.build import BuiltScene
 
 EXTENSION = "EXT_mirrorbake_pem"
-EXTENSION_VERSION = 3
+EXTENSION_VERSION = 4
 TEXTURE_SIZE = 2048
 """Pixels along a side that textures of the material have at most."""
 _BRIGHT_PERCENTILE = 99.0
@@ -89,6 +90,9 @@ def export_glb(
     }
     if fade_degrees(store) is not None:
         extension["fadeDegrees"] = fade_degrees(store)
+    lightmap = _add_lightmap(file, store, built)
+    if lightmap is not None:
+        extension["lightmap"] = lightmap
     materials = [numbers.index(number) for number in of_part]
     primitives = _add_mesh(file, store, built, exported, materials)
     file.document.update(
@@ -204,6 +208,30 @@ def _proxy(description: dict[str, Any]) -> dict[str, Any]:
     return {names.get(key, key): value for key, value in description.items()}
 
 
+def _add_lightmap(file: GlbFile, store: PemStore, built: BuiltScene) -> dict[str, Any] | None:
+    """Add the body's irradiance where it is a map on the bounds of the texture coordinates."""
+    irradiance = store.read_irradiance() if store.header.lightmap else None
+    if irradiance is None:
+        return None
+    uvs = _texture_coordinates(built)
+    described: dict[str, Any] = {
+        "size": store.header.lightmap,
+        "low": uvs.min(axis=0).tolist(),
+        "high": uvs.max(axis=0).tolist(),
+        "front": file.add_values(irradiance[:, :3]),
+    }
+    if irradiance.shape[1] > 3:
+        described["back"] = file.add_values(irradiance[:, 3:])
+    return described
+
+
+def _texture_coordinates(built: BuiltScene) -> FloatArray:
+    """Those of the reflector's vertices, (V, 2), v down as in glTF."""
+    uvs = np.asarray(built.scene.object_mesh(built.reflector).uvs, np.float32) * np.array([1, -1], np.float32)
+    uvs[:, 1] += 1.0
+    return uvs
+
+
 def _add_mesh(
     file: GlbFile, store: PemStore, built: BuiltScene, exported: Materials, materials: Sequence[int]
 ) -> list[dict[str, Any]]:
@@ -213,9 +241,7 @@ def _add_mesh(
     if len(mesh.normals):
         attributes["NORMAL"] = file.add_vertices(np.asarray(mesh.normals, np.float32))
     if len(mesh.uvs):
-        uvs = np.asarray(mesh.uvs, np.float32) * np.array([1, -1], np.float32)
-        uvs[:, 1] += 1.0  # v down
-        attributes["TEXCOORD_0"] = file.add_vertices(uvs)
+        attributes["TEXCOORD_0"] = file.add_vertices(_texture_coordinates(built))
     # A colour of glTF multiplies the base colour, which is the reflectance of a metal.
     tinted = [max(entry.albedo) > 0.0 or entry.colors_tint_reflectance for entry in exported.materials]
     colors = (
@@ -226,7 +252,7 @@ def _add_mesh(
     is_turned = turned[:, 3] != 0.0
     turned[~is_turned] = (1.0, 0.0, 0.0, 1.0)
     tangents = file.add_vertices(turned) if is_turned.any() and len(mesh.normals) else None
-    irradiance = store.read_irradiance()
+    irradiance = None if store.header.lightmap else store.read_irradiance()
     if irradiance is not None:
         attributes["_IRRADIANCE"] = file.add_vertices(np.ascontiguousarray(irradiance[:, :3]))
         if irradiance.shape[1] > 3:

@@ -40,6 +40,10 @@ class GlbFile:
         """Add an attribute (V, C) or (V,), float32; returns its accessor. Positions need their bounds."""
         return self._accessor(values, _ARRAY_BUFFER, bounds)
 
+    def add_values(self, values: NDArray[np.float32]) -> int:
+        """Add values (N, C), float32, that belong to no vertex; returns their accessor."""
+        return self._accessor(values, None, bounds=False)
+
     def add_indices(self, values: NDArray[np.uint32]) -> int:
         """Add indices (N,), uint32; returns their accessor."""
         return self._accessor(values, _ELEMENT_ARRAY_BUFFER, bounds=False)
@@ -94,7 +98,7 @@ class GlbFile:
             )
         )
 
-    def _accessor(self, values: NDArray[Any], target: int, bounds: bool) -> int:
+    def _accessor(self, values: NDArray[Any], target: int | None, bounds: bool) -> int:
         columns = values.reshape(len(values), -1)
         accessor: dict[str, Any] = {
             "bufferView": self._view(np.ascontiguousarray(values).tobytes(), target),

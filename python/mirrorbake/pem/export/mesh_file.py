@@ -37,7 +37,10 @@ class ReflectorMesh:
     materials: NDArray[np.uint16]
     """(T,) material of every triangle."""
     irradiance: FloatArray | None
-    """(V, 3) at rest, W/m², or (V, 6) with that of the backs; None for a body that is black."""
+    """(V, 3) at rest, W/m², or (V, 6) with that of the backs; None for a body that is black. Of a lightmap
+    the texels, (lightmap², 3|6), rows from the top."""
+    lightmap: int = 0
+    """Texels along a side of the map on the bounds of `uvs` that irradiance is; 0: it is at the vertices."""
 
 
 def has_border(positions: FloatArray, triangles: NDArray[np.uint32]) -> bool:
@@ -83,8 +86,8 @@ def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
     -------
     tuple
         The file's bytes, and its description for the manifest: `bounds` of positions and texture
-        coordinates, and for each array its type, its number of components and its place in the file after
-        decompression.
+        coordinates, the size of the `lightmap`, and for each array its type, its number of components and
+        its place in the file after decompression.
     """
     order = np.lexsort((~mesh.whole_stack, mesh.materials, mesh.parts))
     triangles = mesh.triangles[order]
@@ -96,12 +99,11 @@ def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
 
     positions, bounds = _quantised(mesh.positions[used])
     arrays: dict[str, NDArray[Any]] = {"positions": positions, "indices": indices.astype(np.int32)[:, None]}
-    description: dict[str, Any] = {"bounds": bounds}
+    description: dict[str, Any] = {"bounds": bounds, "lightmap": mesh.lightmap or None}
     if len(mesh.normals):
         arrays["normals"] = octahedral(mesh.normals[used])
     if len(mesh.uvs):
-        uvs = mesh.uvs[used].astype(np.float64)
-        arrays["uvs"], description["uvBounds"] = _quantised(np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1))
+        arrays["uvs"], description["uvBounds"] = _coordinates(mesh, used)
     if len(mesh.colors):
         arrays["colors"] = np.rint(np.clip(mesh.colors[used], 0.0, 1.0) * 65535.0).astype(np.uint16)
     if len(mesh.tangents):
@@ -109,7 +111,7 @@ def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
         signs = np.rint(32767.0 * np.sign(tangents[:, 3:])).astype(np.int16)
         arrays["tangents"] = np.concatenate([octahedral(tangents[:, :3]), signs], axis=1)
     if mesh.irradiance is not None:
-        arrays["irradiance"] = mesh.irradiance[used].astype(np.float16)
+        arrays["irradiance"] = _halves(mesh.irradiance, mesh, used)
     payload, layout = _pack({name: _differences(array) for name, array in arrays.items()})
     ranges = []
     for part, material in sorted(set(zip(parts.tolist(), materials.tolist(), strict=True))):
@@ -129,11 +131,29 @@ def write_mesh(mesh: ReflectorMesh) -> tuple[bytes, dict[str, Any]]:
 
 
 def write_irradiance(irradiance: FloatArray, mesh: ReflectorMesh) -> bytes:
-    """Encode the irradiance (V, 3|6) of another sample, its vertices in the order of the mesh's file."""
+    """Encode the irradiance of another sample as the mesh's file has it: its vertices or its texels."""
     order = np.lexsort((~mesh.whole_stack, mesh.materials, mesh.parts))
     used = vertex_order(mesh.triangles[order])
-    payload, _ = _pack({"irradiance": irradiance[used].astype(np.float16)})
+    payload, _ = _pack({"irradiance": _halves(irradiance, mesh, used)})
     return gzip.compress(payload, 9, mtime=0)
+
+
+def _halves(irradiance: FloatArray, mesh: ReflectorMesh, used: NDArray[np.int64]) -> NDArray[np.float16]:
+    """Return the irradiance of the vertices that are used, in their order, or of all texels of a lightmap."""
+    rows = irradiance if mesh.lightmap else irradiance[used]
+    return rows.astype(np.float16)
+
+
+def _coordinates(mesh: ReflectorMesh, used: NDArray[np.int64]) -> tuple[NDArray[np.uint16], dict[str, Any]]:
+    """Return the texture coordinates of used vertices, v down, as fractions of their bounds, and the bounds.
+
+    A lightmap lies on the bounds of all vertices.
+    """
+    uvs = mesh.uvs.astype(np.float64) * [1.0, -1.0] + [0.0, 1.0]
+    if not mesh.lightmap:
+        return _quantised(uvs[used])
+    fractions, bounds = _quantised(uvs)
+    return fractions[used], bounds
 
 
 def vertex_order(triangles: NDArray[np.uint32]) -> NDArray[np.int64]:
@@ -143,7 +163,7 @@ def vertex_order(triangles: NDArray[np.uint32]) -> NDArray[np.int64]:
     return ordered
 
 
-def _quantised(points: FloatArray) -> tuple[NDArray[np.uint16], dict[str, Any]]:
+def _quantised(points: NDArray[np.floating[Any]]) -> tuple[NDArray[np.uint16], dict[str, Any]]:
     """Return points as 16-bit fractions of their bounds, and the bounds."""
     wide = points.astype(np.float64)
     low, high = wide.min(axis=0), wide.max(axis=0)

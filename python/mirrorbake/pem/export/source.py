@@ -84,7 +84,7 @@ class ExportSource:
     mesh: ReflectorMesh
     materials: Materials
     irradiance: Callable[[int], FloatArray] | None
-    """`irradiance(sample)`: (V, 3|6) as the mesh has it, where it changes between samples, else None."""
+    """`irradiance(sample)`: as the mesh has it, where it changes between samples, else None."""
     static: FloatArray
     """All levels of the static map, (texels, 3)."""
     static_proxy: dict[str, Any]
@@ -133,6 +133,7 @@ def export_source(pem: OpenedPem) -> ExportSource:
     first = store.read_irradiance()
     changes = first is not None and store.has_irradiance_per_sample
 
+    are_uvs_read = len(materials.textures) > 0 or header.lightmap > 0
     readers = {header.map_of(*name): name for name in header.map_names()}
 
     def pyramid(sample: int, number: int) -> FloatArray:
@@ -165,11 +166,12 @@ def export_source(pem: OpenedPem) -> ExportSource:
             triangles=built.triangles,
             parts=built.parts,
             whole_stack=whole,
-            uvs=np.asarray(mesh.uvs) if materials.textures else np.zeros((0, 2), np.float32),
+            uvs=np.asarray(mesh.uvs) if are_uvs_read else np.zeros((0, 2), np.float32),
             colors=np.asarray(mesh.colors),
             tangents=np.asarray(mesh.tangents),
             materials=np.array([numbers.index(number) for number in of_part], np.uint16)[built.parts],
             irradiance=first,
+            lightmap=header.lightmap,
         ),
         materials=materials,
         irradiance=irradiance if changes else None,

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from mirrorbake.pem.export.source import ExportSource
 
 FORMAT_NAME = "mirrorbake-web"
-FORMAT_VERSION = 5
+FORMAT_VERSION = 6
 MANIFEST_NAME = "manifest.json"
 
 PROBED_SAMPLES = 16

@@ -52,11 +52,27 @@ class Agreement:
     """Of processor time that the second took, all threads together."""
 
 
+@dataclass(frozen=True)
+class Bias:
+    """Of one kind of indirect light against paths, in shares of the mean radiance."""
+
+    mean: float
+    worst: float
+    """Of the block that is most off."""
+    error: float
+    """Standard error of that."""
+    block: tuple[int, int]
+    """Its row and column, from the picture's top left corner."""
+
+
 class View:
     """One view of a scene, traced again and again."""
 
-    def __init__(self, object_file: str | None = None, sky: str | None = None, side: int = SIDE) -> None:
+    def __init__(
+        self, object_file: str | None = None, sky: str | None = None, side: int = SIDE, cache_seed: int = 0
+    ) -> None:
         self._side = side
+        self._cache_seed = cache_seed
         self._tracers: dict[Indirect, _core.Tracer] = {}
         views = {"kind": "fixed", "size": [side, side], "fov": FIELD_OF_VIEW}
         scene: dict[str, object] = {"views": views}
@@ -95,7 +111,9 @@ class View:
         if indirect not in self._tracers:
             self._tracers[indirect] = _core.Tracer(
                 self._stage.built.scene,
-                _core.TracerOptions(indirect=indirect, focus=self._stage.built.reflector),
+                _core.TracerOptions(
+                    indirect=indirect, seed=self._cache_seed, focus=self._stage.built.reflector
+                ),
             )
         options = _core.TraceOptions(
             samples_per_pixel=samples, max_specular_depth=8, max_diffuse_depth=16, seed=seed
@@ -121,7 +139,7 @@ BIAS_SIDE, BLOCK = 64, 8
 """Pixels of a picture, and of a block."""
 
 
-def bias(samples: int, pictures: int) -> dict[Indirect, tuple[float, float, float]]:
+def bias(samples: int, pictures: int, side: int = BIAS_SIDE, cache_seed: int = 0) -> dict[Indirect, Bias]:
     """Compare light that is cached, or none, with paths: the teapot's view in blocks.
 
     All take the same random numbers, so that what they share cancels.
@@ -132,30 +150,35 @@ def bias(samples: int, pictures: int) -> dict[Indirect, tuple[float, float, floa
         Per pixel, of each picture.
     pictures
         Whose scatter tells the error of their mean.
+    side
+        Pixels of a side, a multiple of BLOCK.
+    cache_seed
+        Of the cached light: another one has other errors.
 
     Returns
     -------
-        By `trace.indirect`: mean difference, that of the worst block, and its standard error at most, as
-        shares of the mean radiance. Blocks count that the object covers by a quarter.
+        By `trace.indirect`, of blocks that the object covers by a quarter.
     """
-    view = View(side=BIAS_SIDE)
+    view = View(side=side, cache_seed=cache_seed)
     paths = [view.blocks("path", samples, seed) for seed in range(pictures)]
     hits = np.sum([count for _, count in paths], axis=0)
-    kept = hits > 0.25 * hits.max()
-    whole = np.mean([light[kept] / count[kept] for light, count in paths], axis=0)
-    found: dict[Indirect, tuple[float, float, float]] = {}
+    kept = np.flatnonzero(hits > 0.25 * hits.max())
+    whole = np.mean([light[kept] / count[kept] for light, count in paths])
+    found: dict[Indirect, Bias] = {}
     modes: tuple[Indirect, ...] = ("cached", "none")
     for mode in modes:
         others = [view.blocks(mode, samples, seed) for seed in range(pictures)]
         off = np.array(
             [
-                (a[kept] / m[kept] - b[kept] / n[kept]) / whole.mean()
+                (a[kept] / m[kept] - b[kept] / n[kept]) / whole
                 for (a, m), (b, n) in zip(others, paths, strict=True)
             ]
         )
         mean = off.mean(axis=0)
         error = off.std(axis=0, ddof=1) / pictures**0.5
-        found[mode] = (float(mean.mean()), float(mean[np.abs(mean).argmax()]), float(error.max()))
+        worst = int(np.abs(mean).argmax())
+        row, column = divmod(int(kept[worst]), side // BLOCK)
+        found[mode] = Bias(float(mean.mean()), float(mean[worst]), float(error[worst]), (row, column))
     return found
 
 
@@ -168,14 +191,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--pictures", type=int, default=4, metavar="N", help="of 1024 samples a pixel for --bias, 2 or more"
     )
+    parser.add_argument(
+        "--cache-seed", type=int, default=0, metavar="N", help="of the cached light that --bias looks at"
+    )
     options = parser.parse_args(arguments)
     if options.bias and (options.object or options.sky):
         parser.error("--bias is measured of the teapot in its room, without --object and --sky")
     if options.pictures < 2:
         parser.error(f"--pictures {options.pictures}: expected 2 or more")
+    if not 0 <= options.cache_seed < 2**64:
+        parser.error(f"--cache-seed {options.cache_seed}: expected 0 to 2^64 - 1")
     if options.bias:
-        for mode, (mean, worst, error) in bias(1024, options.pictures).items():
-            print(f"{mode}: {mean:+.2%} in the mean, {worst:+.2%} in the worst block, ±{error:.2%} at most")
+        for mode, off in bias(1024, options.pictures, cache_seed=options.cache_seed).items():
+            row, column = off.block
+            print(
+                f"{mode}: {off.mean:+.2%} in the mean, {off.worst:+.2%} ±{off.error:.2%} "
+                f"in the worst block (row {row}, column {column} from the top left, from 0)"
+            )
         return
     view = View(options.object, options.sky)
     print("| samples | against | noise allowed | spent | agree to | processor seconds |")

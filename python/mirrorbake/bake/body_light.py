@@ -25,8 +25,8 @@ _FINE_MESH, _SHARED_BY = 1 << 14, 4
 with a ring of six still has more than each would have had alone."""
 _PROBE_RAYS = (2, 16)
 
-_PLACES = 3
-"""Along a side of a texel, at which light is gathered for it."""
+_MOST_PLACES, _PLACES_OF_A_MAP = 3, 512
+"""Along a side of a texel and of the map, at which light is gathered."""
 _BILINEAR = _core.RunTimeModel(
     name="lightmap", places=[[0.5, 0.5]], footprint_scale=1.0, filter="bilinear", max_taps=1
 )
@@ -111,7 +111,8 @@ class Lightmap:
             )
         self._stage, self._size = stage, size
         self._topology = _core.TexelTopology.atlas(size, size)
-        self._samples = _core.texture_samples(built.positions, built.triangles, uvs, size, _PLACES)
+        places = max(1, min(_MOST_PLACES, _PLACES_OF_A_MAP // size))
+        self._samples = _core.texture_samples(built.positions, built.triangles, uvs, size, places)
         self._matrix = _core.build_rendering_matrix(
             self._samples, 0, _core.Proxy.infinite(), self._topology, _BILINEAR
         )

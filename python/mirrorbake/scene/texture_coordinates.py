@@ -27,9 +27,19 @@ def atlas_coordinates(mesh: _core.TriangleMesh) -> FloatArray:
     uvs = np.asarray(mesh.uvs, np.float64).reshape(-1, 2)
     if not len(uvs) or not np.isfinite(uvs).all():
         return np.zeros((0, 2), np.float32)
-    low, high = uvs.min(axis=0), uvs.max(axis=0)
-    shares: FloatArray = ((uvs - low) / np.where(high > low, high - low, 1.0)).astype(np.float32)
+    low, high = atlas_bounds(mesh)
+    shares: FloatArray = ((uvs - low) / (high - low)).astype(np.float32)
     return shares
+
+
+def atlas_bounds(mesh: _core.TriangleMesh) -> NDArray[np.float64]:
+    """Return the least and the largest texture coordinates of a mesh's triangles, (2, 2).
+
+    They are 1 apart where all are alike.
+    """
+    used = np.asarray(mesh.uvs, np.float64)[np.unique(mesh.triangles)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    return np.stack([low, np.where(high > low, high, low + 1.0)])
 
 
 def has_own_texels(positions: FloatArray, triangles: NDArray[np.uint32], uvs: FloatArray) -> bool:

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
     from mirrorbake.scene.stage import Stage
 
-_MOST_RAYS, _LEAST_RAYS, _RAYS_OF_A_MESH = 1024, 16, 1 << 23
+RAYS = 1 << 23
+"""Gathered for a side of a body, and at a vertex or a place of it:"""
+_MOST_RAYS, _LEAST_RAYS = 1024, 16
 _FINE_MESH, _SHARED_BY = 1 << 14, 4
 """Vertices from which on neighbours share their rays, and how many times fewer each one then takes: the mean
 with a ring of six still has more than each would have had alone."""
@@ -33,7 +35,9 @@ _BILINEAR = _core.RunTimeModel(
 _SOLVE = _core.SolveOptions(smoothness=1e-3, level_agreement=1e-3, prior_weight=0.0, tolerance=1e-4)
 
 
-def irradiance_of(stage: Stage, sides: int, lightmap: int = 0) -> FloatArray:
+def irradiance_of(
+    stage: Stage, sides: int, lightmap: int = 0, *, rays: int = RAYS, seed: int | None = None
+) -> FloatArray:
     """Return the irradiance of the reflector's body, (V, 3 * sides) or (S², 3 * sides), W m⁻².
 
     Parameters
@@ -44,11 +48,16 @@ def irradiance_of(stage: Stage, sides: int, lightmap: int = 0) -> FloatArray:
         1: on the front of triangles; 2: on their backs, too.
     lightmap
         S, texels along a side of the map, rows from the top; 0: at the vertices.
+    rays
+        Of a side in all, as far as each place gets neither too few nor too many.
+    seed
+        Of random numbers; None: the scene's.
     """
+    seed = stage.config.trace.seed if seed is None else seed
     if not lightmap:
-        return _at_vertices(stage, sides)
+        return _at_vertices(stage, sides, rays, seed)
     found = Lightmap(stage, lightmap)
-    return found.inferred(found.gathered(sides))
+    return found.inferred(found.gathered(sides, rays, seed))
 
 
 def _sides(count: int) -> Sequence[Literal["front", "back"]]:
@@ -56,16 +65,16 @@ def _sides(count: int) -> Sequence[Literal["front", "back"]]:
     return both[:count]
 
 
-def _at_vertices(stage: Stage, sides: int) -> FloatArray:
+def _at_vertices(stage: Stage, sides: int, rays: int, seed: int) -> FloatArray:
     """Up to 1024 rays are gathered at a vertex.
 
     Of a fine mesh fewer, since more vertices share a pixel, and vertices share them with their neighbours.
     """
     built = stage.built
     count = max(1, len(built.positions))
-    rays = _rays_of(count * (_SHARED_BY if count > _FINE_MESH else 1))
+    each = _rays_of_each(count * (_SHARED_BY if count > _FINE_MESH else 1), rays)
     found = [
-        np.asarray(stage.tracer.vertex_irradiance(built.reflector, rays, stage.config.trace.seed, side))
+        np.asarray(stage.tracer.vertex_irradiance(built.reflector, each, seed, side))
         for side in _sides(sides)
     ]
     if count > _FINE_MESH:
@@ -73,8 +82,8 @@ def _at_vertices(stage: Stage, sides: int) -> FloatArray:
     return np.concatenate(found, axis=1)
 
 
-def _rays_of(count: int) -> int:
-    return min(_MOST_RAYS, max(_LEAST_RAYS, _RAYS_OF_A_MESH // max(1, count)))
+def _rays_of_each(count: int, rays: int) -> int:
+    return min(_MOST_RAYS, max(_LEAST_RAYS, rays // max(1, count)))
 
 
 def shared_over_triangles(values: FloatArray, triangles: NDArray[np.uint32]) -> FloatArray:
@@ -128,12 +137,12 @@ class Lightmap:
         """The places of the surface whose light tells the map's."""
         return self._samples
 
-    def gathered(self, sides: int) -> FloatArray:
-        """Return the irradiance at the samples, (n, 3 * sides)."""
+    def gathered(self, sides: int, rays: int, seed: int) -> FloatArray:
+        """Return the irradiance at the samples, (n, 3 * sides), by `rays` in all of a side."""
         samples, stage = self._samples, self._stage
         places = (stage.built.reflector, samples.triangle, samples.barycentric)
-        rays, seed = _rays_of(len(samples)), stage.config.trace.seed
-        gather = partial(stage.tracer.surface_irradiance, *places, rays, seed)
+        each = _rays_of_each(len(samples), rays)
+        gather = partial(stage.tracer.surface_irradiance, *places, each, seed)
         return np.concatenate([gather(side) for side in _sides(sides)], axis=1)
 
     def inferred(self, light: FloatArray) -> FloatArray:

@@ -19,9 +19,13 @@ if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
     from mirrorbake.scene.stage import Stage
 
+    Lights = tuple[FloatArray, FloatArray]
+
 EDGE, LIGHTMAP = "reflector.longest_edge", "layers.lightmap"
 COARSE_PIXELS = 4
 """Of a trial image, that a triangle covers if light may change unseen between its vertices."""
+TRIAL_RAYS = 1 << 20
+"""By which light is gathered for a trial, twice."""
 MOST_HALVINGS = 6
 MOST_VERTICES = 1 << 16
 """That a mesh is refined to."""
@@ -79,10 +83,10 @@ def light_storage(stage: Stage, *, has_diffuse: bool) -> LightStorage:
     in_map = _because(kept, "the diffuse light is in a map")
     if size:
         return LightStorage(in_map, at_vertices, stage)
-    finer, light = stage, None
+    finer, lights = stage, None
     if edge is None:
-        kept, finer, light = _edge_decision(stage)
-    decision = at_vertices if size == 0 else _lightmap_decision(stage, finer, light)
+        kept, finer, lights = _edge_decision(stage)
+    decision = at_vertices if size == 0 else _lightmap_decision(stage, finer, lights)
     if decision.value:
         return LightStorage(in_map if kept.value else kept, decision, stage)
     return LightStorage(kept, decision, finer)
@@ -95,13 +99,13 @@ def _because(decision: Decision, reason: str | None) -> Decision:
     return replace(decision, reason=reason)
 
 
-def _edge_decision(stage: Stage) -> tuple[Decision, Stage, FloatArray | None]:
+def _edge_decision(stage: Stage) -> tuple[Decision, Stage, Lights | None]:
     """Return the decision, the stage that it leads to, and the light at its vertices, if it was gathered."""
     config = stage.config
-    light = None
+    lights = None
 
-    def as_it_is(reason: str, measured: float | None = None) -> tuple[Decision, Stage, FloatArray | None]:
-        return Decision(EDGE, None, 0.0, True, reason, measured), stage, light
+    def as_it_is(reason: str, measured: float | None = None) -> tuple[Decision, Stage, Lights | None]:
+        return Decision(EDGE, None, 0.0, True, reason, measured), stage, lights
 
     if config.reflector.scene_object is not None:
         return as_it_is("an object of a scene keeps its mesh")
@@ -109,8 +113,8 @@ def _edge_decision(stage: Stage) -> tuple[Decision, Stage, FloatArray | None]:
     if coarse is None:
         return as_it_is("triangles are small in the picture")
     sides = lit_sides(stage)
-    light = irradiance_of(stage, sides)
-    before = TracedLight(stage).change_by(light)
+    lights = _gathered_twice(stage, sides)
+    before = TracedLight(stage).change_by(lights[0], again=lights[1])
     words = f"interpolating diffuse light between vertices changes the picture by {before:.2%} beyond noise"
     if before <= config.auto.tolerance:
         return as_it_is(words, before)
@@ -120,16 +124,23 @@ def _edge_decision(stage: Stage) -> tuple[Decision, Stage, FloatArray | None]:
         edge *= math.sqrt(2.0)
     edge = float(f"{edge:.3g}")
     finer = stage.without_edges_above(edge)
-    finer_light = irradiance_of(finer, sides)
-    after = TracedLight(finer).change_by(finer_light)
+    finer_lights = _gathered_twice(finer, sides)
+    after = TracedLight(finer).change_by(finer_lights[0], again=finer_lights[1])
     if after > 0.8 * before:
         return as_it_is(f"{words}, and no less with finer triangles", before)
     count = len(finer.built.positions)
     reason = f"{words}, by {after:.2%} without longer edges, at {count} vertices"
-    return Decision(EDGE, None, edge, True, reason, before), finer, finer_light
+    return Decision(EDGE, None, edge, True, reason, before), finer, finer_lights
 
 
-def _lightmap_decision(stage: Stage, finer: Stage, light: FloatArray | None) -> Decision:
+def _gathered_twice(stage: Stage, sides: int) -> Lights:
+    """Light at the vertices from two sets of random numbers: their noise leaves no trace in products."""
+    seed = stage.config.trace.seed
+    first, second = (irradiance_of(stage, sides, rays=TRIAL_RAYS, seed=seed + k) for k in (0, 1))
+    return first, second
+
+
+def _lightmap_decision(stage: Stage, finer: Stage, lights: Lights | None) -> Decision:
     """Compare the light at the vertices of a finer mesh with maps that are fitted to it.
 
     None: it has yet to be gathered.
@@ -153,7 +164,7 @@ def _lightmap_decision(stage: Stage, finer: Stage, light: FloatArray | None) -> 
         if takes >= at_vertices:
             break
         if trial is None:
-            trial = LightmapTrial(finer, irradiance_of(finer, sides) if light is None else light)
+            trial = LightmapTrial(finer, _gathered_twice(finer, sides) if lights is None else lights)
         change = trial.change_by(lightmap, size)
         if change <= tolerance:
             reason = f"{words}, in a map {takes / 1e3:.1f} kB, which changes the picture by {change:.2%}"

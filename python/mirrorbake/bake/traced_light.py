@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.bake.probe import BRIGHTEST_SHARE, probe_points, relative_change, small_cameras
+from mirrorbake.bake.probe import BRIGHTEST_SHARE, probe_points, small_cameras
 from mirrorbake.pem.body_light import BodyLight
 
 if TYPE_CHECKING:
@@ -54,7 +54,9 @@ class TracedLight:
             _block_means(traced.sample_beauty, block, blocks),
         )
 
-    def change_by(self, irradiance: FloatArray, lightmap: int = 0) -> float:
+    def change_by(
+        self, irradiance: FloatArray, lightmap: int = 0, *, again: FloatArray | None = None
+    ) -> float:
         """Return how much drawing the bodies' light from an irradiance changes the pictures, beyond noise.
 
         Root mean square over blocks of `BLOCK`² pixels, less twice its standard error, relative to that of
@@ -66,15 +68,18 @@ class TracedLight:
             Of the stage's reflector, as `irradiance_of` returns it.
         lightmap
             Texels along its side; 0: it is at the vertices.
+        again
+            The same from other random numbers, so that the noise of gathering does not count either.
         """
+        lights_of = (irradiance, irradiance if again is None else again)
         body = BodyLight.of(self._stage.built, lightmap)
         products, counts, lights = [], [], []
         for first, second in self._views:
             error, other = (
                 _block_means(
-                    one.samples.diffuse - body.radiance(one.samples, irradiance), one.block, len(one.count)
+                    one.samples.diffuse - body.radiance(one.samples, stored), one.block, len(one.count)
                 )
-                for one in (first, second)
+                for one, stored in zip((first, second), lights_of, strict=True)
             )
             products.append(np.mean(error * other, axis=1))
             counts.append(np.minimum(first.count, second.count))
@@ -93,27 +98,44 @@ class TracedLight:
 class LightmapTrial:
     """Small pictures of a few views, drawn from light at the vertices and from lightmaps fitted to that."""
 
-    def __init__(self, stage: Stage, light: FloatArray) -> None:
-        """Draw them from the irradiance `light` (V, 3), or (V, 6) with the backs."""
-        self._built, self._light = stage.built, light
+    def __init__(self, stage: Stage, lights: tuple[FloatArray, FloatArray]) -> None:
+        """Draw them from irradiance (V, 3), or (V, 6) with the backs, gathered twice."""
+        self._built, self._lights = stage.built, lights
         options = _core.TraceOptions(samples_per_pixel=SAMPLES)
         self._views = [
             stage.tracer.trace_visibility(view, stage.built.reflector, options) for view in small_views(stage)
         ]
 
     def change_by(self, lightmap: Lightmap, size: int) -> float:
-        """Return by how much the pictures change where a map takes the place of the vertices, relative."""
+        """Return by how much the pictures change where a map takes the place of the vertices.
+
+        As `TracedLight.change_by`, but relative to the body's own light, which is more, and with all of it.
+        """
         samples = lightmap.samples
         second, third = np.asarray(samples.barycentric).T[..., None]
-        a, b, c = (self._light[self._built.triangles[samples.triangle, k]] for k in range(3))
-        texels = lightmap.inferred((1.0 - second - third) * a + second * b + third * c)
         vertices, map_ = BodyLight.of(self._built, 0), BodyLight.of(self._built, size)
-        with_vertices = np.concatenate([vertices.radiance(view, self._light) for view in self._views])
-        with_map = np.concatenate([map_.radiance(view, texels) for view in self._views])
-        blocks = [_block_of(view) + (number << 40) for number, view in enumerate(self._views)]
-        return relative_change(
-            with_vertices.astype(np.float64), with_map.astype(np.float64), np.concatenate(blocks)
-        )
+        drawn, changes = [], []
+        for light in self._lights:
+            a, b, c = (light[self._built.triangles[samples.triangle, k]] for k in range(3))
+            texels = lightmap.inferred((1.0 - second - third) * a + second * b + third * c)
+            pairs = [(vertices.radiance(view, light), map_.radiance(view, texels)) for view in self._views]
+            at_vertices, in_map = (
+                np.concatenate([_of_blocks(*one) for one in zip(self._views, values, strict=True)])
+                for values in zip(*pairs, strict=True)
+            )
+            drawn.append(at_vertices)
+            changes.append(in_map - at_vertices)
+        # Of the noise of two gatherings, which a map smooths, the product holds nothing.
+        square = float(np.mean(changes[0] * changes[1]))
+        scale = float(np.mean(drawn[0] * drawn[1]))
+        return math.sqrt(max(square, 0.0) / scale) if scale > 0.0 else 0.0
+
+
+def _of_blocks(samples: _core.SurfaceSamples, light: FloatArray) -> DoubleArray:
+    """Sums of samples' light (n, 3) over the blocks of their picture."""
+    blocks = -(-samples.width // BLOCK) * -(-samples.height // BLOCK)
+    block = _block_of(samples)
+    return np.stack([np.bincount(block, light[:, c], blocks) for c in range(3)], axis=-1)
 
 
 def _block_of(samples: _core.SurfaceSamples) -> NDArray[np.int64]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mirrorbake.bake.body_light import Lightmap, irradiance_of, lit_sides
+from mirrorbake.bake.body_light import RAYS, Lightmap, irradiance_of, lit_sides
 from mirrorbake.bake.light_storage import BYTES, SIZES
 from mirrorbake.bake.traced_light import TracedLight
 from mirrorbake.errors import InputError, one_line_errors
@@ -74,7 +74,7 @@ def ways_to_store(config: SceneConfig) -> Iterator[Storage]:
     if has_own_texels(built.positions, built.triangles, uvs):
         for size in SIZES:
             lightmap = Lightmap(stage, size)
-            texels = lightmap.inferred(lightmap.gathered(sides))
+            texels = lightmap.inferred(lightmap.gathered(sides, RAYS, config.trace.seed))
             yield Storage(f"map of {size}²", sides * lightmap.texels, traced.change_by(texels, size))
 
 

@@ -20,6 +20,7 @@ from mirrorbake.scene.build import build_scene
 from mirrorbake.scene.load import parse_config
 from mirrorbake.scene.refine import refined
 from mirrorbake.scene.stage import prepare_stage
+from unwrapped import FACES, NORMALS, PLATE, POST, write_post_on_plate, write_sun
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,10 +29,6 @@ if TYPE_CHECKING:
     from mirrorbake.scene.plan import Decision, Plan
 
     Box = tuple[Sequence[float], Sequence[float]]
-
-FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-PLATE: Box = ((-1.0, 0.0, -1.0), (1.0, 0.1, 1.0))
-POST: Box = ((-0.1, 0.1, -0.1), (0.1, 1.0, 0.1))
 
 
 def corners_of(box: Box) -> np.ndarray:
@@ -140,28 +137,21 @@ def test_edges_that_are_too_short_are_refused(monkeypatch: pytest.MonkeyPatch) -
 # In a scene
 
 
-def coated(
-    folder: Path, boxes: Sequence[Box], *, charts: bool = False, **sections: dict[str, Any]
-) -> dict[str, Any]:
-    """Boxes of one mesh in plastic, under a small sun; with `charts` on texture coordinates from -1 to 7."""
-    lines, faces = [], []
-    for number, box in enumerate(boxes):
-        lines += [f"v {x} {y} {z}" for x, y, z in corners_of(box).tolist()]
-        for side, quad in enumerate(FACES):
-            corners = [f"{corner + 8 * number + 1}//{side + 1}" for corner in quad]
-            if charts:
-                row, column = divmod(6 * number + side, 4)
-                places = ((0, 0), (1, 0), (1, 1), (0, 1))
-                lines += [f"vt {2 * (column + 0.8 * u) - 1} {2 * (row + 0.8 * v) - 1}" for u, v in places]
-                first = 4 * (6 * number + side) + 1
-                corners = [text.replace("//", f"/{first + k}/") for k, text in enumerate(corners)]
-            faces.append("f " + " ".join(corners))
-    normals = ("0 0 -1", "0 0 1", "0 -1 0", "1 0 0", "0 1 0", "-1 0 0")
-    path = folder / f"boxes-{len(boxes)}{'-charts' if charts else ''}.obj"
-    path.write_text("\n".join([*lines, *(f"vn {normal}" for normal in normals), *faces]) + "\n")
-    sky = np.full((32, 64, 3), 0.3, np.float32)
-    sky[8:10, 20:22] = 120.0
-    _core.save_image(str(folder / "sky.exr"), sky, ["R", "G", "B"], format="float32")
+def coated(folder: Path, boxes: Sequence[Box] | None = None, **sections: dict[str, Any]) -> dict[str, Any]:
+    """Boxes of one mesh in plastic, under a small sun; None: a post on a plate, with texture coordinates."""
+    path = folder / ("unwrapped.obj" if boxes is None else f"boxes-{len(boxes)}.obj")
+    if boxes is None:
+        write_post_on_plate(path)
+    else:
+        lines, faces = [], []
+        for number, box in enumerate(boxes):
+            lines += [f"v {x} {y} {z}" for x, y, z in corners_of(box).tolist()]
+            faces += [
+                "f " + " ".join(f"{corner + 8 * number + 1}//{side + 1}" for corner in quad)
+                for side, quad in enumerate(FACES)
+            ]
+        path.write_text("\n".join([*lines, *(f"vn {normal}" for normal in NORMALS), *faces]) + "\n")
+    write_sun(folder / "sky.exr")
     scene: dict[str, dict[str, Any]] = {
         "reflector": {"mesh": str(path), "height": 1.0, "parts": "joined"},
         "material": {
@@ -250,7 +240,7 @@ def test_fine_meshes_are_not_measured(tmp_path: Path) -> None:
 def test_a_shadow_on_a_mesh_with_texture_coordinates_lies_in_a_lightmap(tmp_path: Path) -> None:
     decibels = {}
     for size in (0, "auto"):
-        scene = coated(tmp_path, [PLATE, POST], charts=True, layers={"lightmap": size})
+        scene = coated(tmp_path, layers={"lightmap": size})
         bake(parse_config(scene, "plate"), tmp_path / str(size))
         pem = open_pem(tmp_path / str(size))
         decibels[size] = decibels_of(pem)
@@ -270,7 +260,7 @@ def test_a_shadow_on_a_mesh_with_texture_coordinates_lies_in_a_lightmap(tmp_path
 
 
 def test_a_lightmap_of_linear_light_is_linear_and_black_where_nothing_reads_it(tmp_path: Path) -> None:
-    stage = prepare_stage(parse_config(coated(tmp_path, [PLATE], charts=True), "plate"))
+    stage = prepare_stage(parse_config(coated(tmp_path), "plate"))
     lightmap = Lightmap(stage, 32)
     places = np.asarray(lightmap.samples.reflection)[:, :2]
     light = np.stack([1.0 + places[:, 0], 2.0 * places[:, 1], places.sum(axis=1)], axis=1)
@@ -282,7 +272,7 @@ def test_a_lightmap_of_linear_light_is_linear_and_black_where_nothing_reads_it(t
     np.testing.assert_allclose(texels[seen], linear[seen], atol=0.01)
     black = ~texels.any(axis=-1)
     assert 32 * 32 - black.sum() == lightmap.texels
-    assert black.sum() > 100
+    assert black.sum() > 20
 
 
 def test_texels_near_some_are_those_and_the_eight_around() -> None:
@@ -310,7 +300,7 @@ def test_a_lightmap_has_both_sides_of_a_sheet(tmp_path: Path) -> None:
 
 
 def test_a_lightmap_changes_with_the_scene(tmp_path: Path) -> None:
-    scene = coated(tmp_path, [PLATE, POST], charts=True, layers={"lightmap": 32})
+    scene = coated(tmp_path, layers={"lightmap": 32})
     scene["views"] = {"count": 1, "start": 20.0, "size": [64, 64]}
     scene["light"] = {"turn": 90.0, "count": 2}
     bake(parse_config(scene, "plate"), tmp_path / "pem")

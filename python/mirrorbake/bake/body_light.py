@@ -32,7 +32,9 @@ _MOST_PLACES, _PLACES_OF_A_MAP = 3, 512
 _BILINEAR = _core.RunTimeModel(
     name="lightmap", places=[[0.5, 0.5]], footprint_scale=1.0, filter="bilinear", max_taps=1
 )
-_SOLVE = _core.SolveOptions(smoothness=1e-3, level_agreement=1e-3, prior_weight=0.0, tolerance=1e-4)
+_SMOOTHNESS = 72.0
+"""Over the rays of a texel: λ of squared differences of neighbours, in proportion to the noise, as a Wiener
+filter has it. Without it the texels of a large map are noisier than what was gathered for them."""
 
 
 def irradiance_of(
@@ -156,7 +158,9 @@ class Lightmap:
             The solver did not converge.
         """
         matrix, size = self._matrix, self._size
-        solver = _core.MapSolver([(matrix, [(0, 1.0)])], [self._topology], options=_SOLVE)
+        smoothness = _SMOOTHNESS * self.texels / RAYS
+        options = _core.SolveOptions(smoothness=smoothness, prior_weight=0.0, tolerance=1e-4)
+        solver = _core.MapSolver([(matrix, [(0, 1.0)])], [self._topology], options=options)
         covered = np.asarray(matrix.row_samples, np.float32) / np.float32(self._samples.samples_per_pixel)
         weights = np.ascontiguousarray(np.repeat(covered[:, None], 3, axis=1))
         found = []

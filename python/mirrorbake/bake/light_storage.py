@@ -29,6 +29,9 @@ TRIAL_RAYS = 1 << 20
 MOST_HALVINGS = 6
 MOST_VERTICES = 1 << 16
 """That a mesh is refined to."""
+MAP_SHARE = 0.5
+"""Of `auto.tolerance`, by which a lightmap may change the picture: errors add in squares, so that one of the
+vertices that meets the tolerance grows by an eighth at most."""
 SIZES = (16, 32, 64, 128, 256, 512)
 """Texels along the sides of maps that are tried."""
 BYTES = 6
@@ -53,7 +56,7 @@ def light_storage(stage: Stage, *, has_diffuse: bool) -> LightStorage:
     Samples of small images of a few views are compared with light that is interpolated from the vertices.
     Where triangles are large in the picture and the difference is more than `auto.tolerance`, edges are
     halved as often as the difference has to be; it is then measured again. A lightmap takes the place of the
-    vertices if it takes fewer bytes and changes the pictures by no more than the tolerance.
+    vertices if it takes fewer bytes and changes the pictures by no more than half the tolerance.
 
     Parameters
     ----------
@@ -149,7 +152,7 @@ def _lightmap_decision(stage: Stage, finer: Stage, lights: Lights | None) -> Dec
     def decided(size: int, reason: str, measured: float | None = None) -> Decision:
         return Decision(LIGHTMAP, None, size, True, reason, measured)
 
-    built, tolerance = finer.built, stage.config.auto.tolerance
+    built, most = finer.built, MAP_SHARE * stage.config.auto.tolerance
     uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
     if not has_own_texels(built.positions, built.triangles, uvs):
         return decided(0, "the mesh has no texture coordinates of its own for every place")
@@ -166,10 +169,10 @@ def _lightmap_decision(stage: Stage, finer: Stage, lights: Lights | None) -> Dec
         if trial is None:
             trial = LightmapTrial(finer, _gathered_twice(finer, sides) if lights is None else lights)
         change = trial.change_by(lightmap, size)
-        if change <= tolerance:
+        if change <= most:
             reason = f"{words}, in a map {takes / 1e3:.1f} kB, which changes the picture by {change:.2%}"
             return decided(size, reason, change)
-    return decided(0, f"{words}, in a map that changes the picture by no more than {tolerance:.1%} no less")
+    return decided(0, f"{words}, in a map that changes the picture by no more than {most:.1%} no less")
 
 
 def _has_textures(stage: Stage) -> bool:

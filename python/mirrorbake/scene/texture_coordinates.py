@@ -33,12 +33,9 @@ def atlas_coordinates(mesh: _core.TriangleMesh) -> FloatArray:
 
 
 def atlas_bounds(mesh: _core.TriangleMesh) -> NDArray[np.float64]:
-    """Return the least and the largest texture coordinates of a mesh's triangles, (2, 2).
-
-    They are 1 apart where all are alike.
-    """
-    used = np.asarray(mesh.uvs, np.float64)[np.unique(mesh.triangles)]
-    low, high = used.min(axis=0), used.max(axis=0)
+    """Return the least and the largest texture coordinates of a mesh, (2, 2); 1 apart where all are alike."""
+    uvs = np.asarray(mesh.uvs, np.float64)
+    low, high = uvs.min(axis=0), uvs.max(axis=0)
     return np.stack([low, np.where(high > low, high, low + 1.0)])
 
 

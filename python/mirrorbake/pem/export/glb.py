@@ -20,12 +20,12 @@ from mirrorbake.pem.export.map_sets import (
 from mirrorbake.pem.export.materials import export_materials
 from mirrorbake.pem.export.mesh_file import has_border
 from mirrorbake.pem.export.radiance_code import RadianceCode, to_atlas
+from mirrorbake.scene.texture_coordinates import atlas_bounds
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from mirrorbake.arrays import FloatArray
     from mirrorbake.pem.export.map_sets import MapSet, ShellMap
     from mirrorbake.pem.export.materials import Materials
     from mirrorbake.pem.store import PemStore
@@ -213,23 +213,17 @@ def _add_lightmap(file: GlbFile, store: PemStore, built: BuiltScene) -> dict[str
     irradiance = store.read_irradiance() if store.header.lightmap else None
     if irradiance is None:
         return None
-    uvs = _texture_coordinates(built)
+    (left, bottom), (right, top) = atlas_bounds(built.scene.object_mesh(built.reflector)).tolist()
     described: dict[str, Any] = {
         "size": store.header.lightmap,
-        "low": uvs.min(axis=0).tolist(),
-        "high": uvs.max(axis=0).tolist(),
+        # v down, as in glTF
+        "low": [left, 1.0 - top],
+        "high": [right, 1.0 - bottom],
         "front": file.add_values(irradiance[:, :3]),
     }
     if irradiance.shape[1] > 3:
         described["back"] = file.add_values(irradiance[:, 3:])
     return described
-
-
-def _texture_coordinates(built: BuiltScene) -> FloatArray:
-    """Those of the reflector's vertices, (V, 2), v down as in glTF."""
-    uvs = np.asarray(built.scene.object_mesh(built.reflector).uvs, np.float32) * np.array([1, -1], np.float32)
-    uvs[:, 1] += 1.0
-    return uvs
 
 
 def _add_mesh(
@@ -241,7 +235,9 @@ def _add_mesh(
     if len(mesh.normals):
         attributes["NORMAL"] = file.add_vertices(np.asarray(mesh.normals, np.float32))
     if len(mesh.uvs):
-        attributes["TEXCOORD_0"] = file.add_vertices(_texture_coordinates(built))
+        uvs = np.asarray(mesh.uvs, np.float32) * np.array([1, -1], np.float32)
+        uvs[:, 1] += 1.0  # v down
+        attributes["TEXCOORD_0"] = file.add_vertices(uvs)
     # A colour of glTF multiplies the base colour, which is the reflectance of a metal.
     tinted = [max(entry.albedo) > 0.0 or entry.colors_tint_reflectance for entry in exported.materials]
     colors = (

@@ -531,6 +531,19 @@ def test_a_plan_without_one_of_its_decisions_is_damaged() -> None:
         Plan.from_dict(data)
 
 
+@pytest.mark.parametrize("size", ["64", -4, 3, 1 << 20, 64.0, True])
+def test_a_plan_with_a_lightmap_of_no_size_is_damaged(size: Any) -> None:
+    plan = make_plan()
+    own = tuple(decision for decision in plan.decisions if decision.key != "layers.diffuse")
+    lit = Decision("layers.diffuse", None, True, True, "", None)
+    lightmap = Decision("layers.lightmap", None, 64, True, "", None)
+    good = dataclasses.replace(plan, decisions=(*own, lit, lightmap))
+    assert Plan.from_dict(good.to_dict()).lightmap == 64
+    bad = dataclasses.replace(plan, decisions=(*own, lit, dataclasses.replace(lightmap, value=size)))
+    with pytest.raises(KeyError, match=r"layers\.lightmap"):
+        Plan.from_dict(bad.to_dict())
+
+
 def test_two_bakes_cannot_write_to_one_folder(tmp_path: Path) -> None:
     with exclusive(tmp_path), pytest.raises(StoreError, match="another bake is writing"), exclusive(tmp_path):
         pass

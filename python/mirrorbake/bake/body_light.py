@@ -104,6 +104,13 @@ def shared_over_triangles(values: FloatArray, triangles: NDArray[np.uint32]) -> 
     return means.astype(np.float32)
 
 
+def own_coordinates(stage: Stage) -> FloatArray | None:
+    """Return the reflector's `atlas_coordinates` (V, 2); None unless each place of it has its own."""
+    built = stage.built
+    uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
+    return uvs if has_own_texels(built.positions, built.triangles, uvs) else None
+
+
 class Lightmap:
     """A square map on the bounds of a reflector's texture coordinates, before its light is inferred.
 
@@ -112,14 +119,9 @@ class Lightmap:
     """
 
     def __init__(self, stage: Stage, size: int) -> None:
-        """Find what is read of `size`² texels; InputError if places of the surface share them."""
-        built = stage.built
-        uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
-        if not has_own_texels(built.positions, built.triangles, uvs):
-            raise InputError(
-                f"layers.lightmap: {size}: the mesh has no texture coordinates, or shares them between "
-                "several places of its surface; expected 0, light at the vertices"
-            )
+        """Find what is read of `size`² texels. The reflector has `own_coordinates`."""
+        uvs, built = own_coordinates(stage), stage.built
+        assert uvs is not None
         self._stage, self._size = stage, size
         self._topology = _core.TexelTopology.atlas(size, size)
         places = max(1, min(_MOST_PLACES, _PLACES_OF_A_MAP // size))

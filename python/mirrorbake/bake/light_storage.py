@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.bake.body_light import Lightmap, irradiance_of, lit_sides
+from mirrorbake.bake.body_light import Lightmap, irradiance_of, lit_sides, own_coordinates
 from mirrorbake.bake.traced_light import LightmapTrial, TracedLight, small_views
+from mirrorbake.errors import InputError
 from mirrorbake.scene.plan import Decision
 from mirrorbake.scene.refine import refined
-from mirrorbake.scene.texture_coordinates import atlas_coordinates, has_own_texels
 
 if TYPE_CHECKING:
     from mirrorbake.arrays import FloatArray
@@ -79,8 +79,11 @@ def light_storage(stage: Stage, *, has_diffuse: bool) -> LightStorage:
         reason = "there is no diffuse layer"
     elif stage.space.changes_scene:
         reason = "the scene changes, so that no view stands for all"
-    if size:
-        Lightmap(stage, size)
+    if size and own_coordinates(stage) is None:
+        raise InputError(
+            f"layers.lightmap: {size}: the mesh has no texture coordinates, or shares them between several "
+            "places of its surface; expected 0, light at the vertices"
+        )
     if reason is not None or (size is not None and edge is not None):
         return LightStorage(_because(kept, reason), _because(at_vertices, reason), stage)
     in_map = _because(kept, "the diffuse light is in a map")
@@ -153,8 +156,7 @@ def _lightmap_decision(stage: Stage, finer: Stage, lights: Lights | None) -> Dec
         return Decision(LIGHTMAP, None, size, True, reason, measured)
 
     built, most = finer.built, MAP_SHARE * stage.config.auto.tolerance
-    uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
-    if not has_own_texels(built.positions, built.triangles, uvs):
+    if own_coordinates(finer) is None:
         return decided(0, "the mesh has no texture coordinates of its own for every place")
     sides, own = lit_sides(finer), len(stage.built.positions)
     at_vertices = BYTES * sides * len(built.positions) + BYTES_OF_VERTEX * (len(built.positions) - own)

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from mirrorbake.scene.config_shells import Shells, ShellSection
+from mirrorbake.scene.config_values import MAX_MAP_SIZE
 from mirrorbake.scene.spacing_law import SpacingLaw
 
 if TYPE_CHECKING:
@@ -239,4 +240,7 @@ class Plan:
         for key in set(DECIDED_KEYS) - {"reflector.longest_edge", "layers.lightmap"}:
             if all(decision.key != key for decision in plan.decisions):
                 raise KeyError(key)
+        size: Any = plan.lightmap
+        if type(size) is not int or not 0 <= size <= MAX_MAP_SIZE or size & (size - 1):
+            raise KeyError("layers.lightmap")
         return plan

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mirrorbake.bake.body_light import RAYS, Lightmap, irradiance_of, lit_sides
+from mirrorbake.bake.body_light import RAYS, Lightmap, irradiance_of, lit_sides, own_coordinates
 from mirrorbake.bake.light_storage import BYTES, SIZES
 from mirrorbake.bake.traced_light import TracedLight
 from mirrorbake.errors import InputError, one_line_errors
 from mirrorbake.scene.load import load_config, parse_override
 from mirrorbake.scene.stage import prepare_stage
-from mirrorbake.scene.texture_coordinates import atlas_coordinates, has_own_texels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -70,8 +69,7 @@ def ways_to_store(config: SceneConfig) -> Iterator[Storage]:
         name = f"vertices, edges up to {1e3 * edge / 2**halvings:.3g} mm"
         change = TracedLight(finer).change_by(irradiance_of(finer, sides))
         yield Storage(name, sides * len(finer.built.positions), change)
-    uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
-    if has_own_texels(built.positions, built.triangles, uvs):
+    if own_coordinates(stage) is not None:
         for size in SIZES:
             lightmap = Lightmap(stage, size)
             texels = lightmap.inferred(lightmap.gathered(sides, RAYS, config.trace.seed))

@@ -109,7 +109,8 @@ class LightmapTrial:
     def change_by(self, lightmap: Lightmap, size: int) -> float:
         """Return by how much the pictures change where a map takes the place of the vertices.
 
-        As `TracedLight.change_by`, but relative to the body's own light, which is more, and with all of it.
+        Root mean square over blocks, without the noise of gathering, relative to that of the body's light:
+        what it reflects besides hides nothing.
         """
         samples = lightmap.samples
         second, third = np.asarray(samples.barycentric).T[..., None]

@@ -321,5 +321,7 @@ def test_a_mesh_without_coordinates_of_its_own_has_no_lightmap(tmp_path: Path) -
 
 @pytest.mark.parametrize("size", [-1, 3, 8192, "big"])
 def test_lightmaps_of_other_sizes_are_refused(tmp_path: Path, size: Any) -> None:
-    with pytest.raises(InputError, match=r"layers\.lightmap"):
+    expected = {-1: "greater than or equal to 0", 3: "a power of two", 8192: "less than or equal to 4096"}
+    words = expected.get(size, "integer")
+    with pytest.raises(InputError, match=rf"layers\.lightmap.*should be .*{words}"):
         parse_config(coated(tmp_path, [PLATE], layers={"lightmap": size}), "plate")

@@ -71,3 +71,9 @@ def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str]) -> Non
     with pytest.raises(SystemExit):
         main(["--bias", "--cache-seed", "-1"])
     assert "--cache-seed -1: expected 0 to 2^64 - 1" in capsys.readouterr().err
+
+
+def test_a_seed_that_nothing_takes_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--cache-seed", "1"])
+    assert "--cache-seed 1: is measured with --bias alone" in capsys.readouterr().err

@@ -104,11 +104,11 @@ def shared_over_triangles(values: FloatArray, triangles: NDArray[np.uint32]) -> 
     return means.astype(np.float32)
 
 
-def own_coordinates(stage: Stage) -> FloatArray | None:
-    """Return the reflector's `atlas_coordinates` (V, 2); None unless each place of it has its own."""
+def has_own_coordinates(stage: Stage) -> bool:
+    """Whether each place of the reflector has texture coordinates of its own, as a lightmap takes."""
     built = stage.built
     uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
-    return uvs if has_own_texels(built.positions, built.triangles, uvs) else None
+    return has_own_texels(built.positions, built.triangles, uvs)
 
 
 class Lightmap:
@@ -119,9 +119,9 @@ class Lightmap:
     """
 
     def __init__(self, stage: Stage, size: int) -> None:
-        """Find what is read of `size`² texels. The reflector has `own_coordinates`."""
-        uvs, built = own_coordinates(stage), stage.built
-        assert uvs is not None
+        """Find what is read of `size`² texels. The reflector `has_own_coordinates`."""
+        built = stage.built
+        uvs = atlas_coordinates(built.scene.object_mesh(built.reflector))
         self._stage, self._size = stage, size
         self._topology = _core.TexelTopology.atlas(size, size)
         places = max(1, min(_MOST_PLACES, _PLACES_OF_A_MAP // size))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mirrorbake import _core
-from mirrorbake.bake.body_light import Lightmap, irradiance_of, lit_sides, own_coordinates
+from mirrorbake.bake.body_light import Lightmap, has_own_coordinates, irradiance_of, lit_sides
 from mirrorbake.bake.traced_light import LightmapTrial, TracedLight, small_views
 from mirrorbake.errors import InputError
 from mirrorbake.scene.plan import Decision
@@ -79,7 +79,7 @@ def light_storage(stage: Stage, *, has_diffuse: bool) -> LightStorage:
         reason = "there is no diffuse layer"
     elif stage.space.changes_scene:
         reason = "the scene changes, so that no view stands for all"
-    if size and own_coordinates(stage) is None:
+    if size and not has_own_coordinates(stage):
         raise InputError(
             f"layers.lightmap: {size}: the mesh has no texture coordinates, or shares them between several "
             "places of its surface; expected 0, light at the vertices"
@@ -156,9 +156,10 @@ def _lightmap_decision(stage: Stage, finer: Stage, lights: Lights | None) -> Dec
         return Decision(LIGHTMAP, None, size, True, reason, measured)
 
     built, most = finer.built, MAP_SHARE * stage.config.auto.tolerance
-    if own_coordinates(finer) is None:
+    if not has_own_coordinates(finer):
         return decided(0, "the mesh has no texture coordinates of its own for every place")
-    sides, own = lit_sides(finer), len(stage.built.positions)
+    sides = lit_sides(finer) if lights is None else lights[0].shape[1] // 3
+    own = len(stage.built.positions)
     at_vertices = BYTES * sides * len(built.positions) + BYTES_OF_VERTEX * (len(built.positions) - own)
     coordinates = 0 if _has_textures(stage) else BYTES_OF_UV * own
     words = f"light at the vertices takes {at_vertices / 1e3:.1f} kB"

@@ -21,6 +21,7 @@ from mirrorbake.scene.config_values import (
     AUTO,
     Extinction,
     Index,
+    LightmapSize,
     MapSize,
     Reflectance,
     Section,
@@ -212,7 +213,7 @@ class Layers(Section):
 
     diffuse: Annotated[bool | None, *AUTO] = None
     """What the body reflects and emits, as irradiance. "auto": if it changes the picture."""
-    lightmap: Annotated[Literal[0] | MapSize | None, *AUTO] = None
+    lightmap: Annotated[LightmapSize | None, *AUTO] = None
     """Texels along a side of a map on the mesh's texture coordinates, a power of two, that holds the body's
     irradiance; 0: it is at the vertices. "auto": what takes fewer bytes at equal error."""
     local: Annotated[bool | None, *AUTO] = None

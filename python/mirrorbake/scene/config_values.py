@@ -89,6 +89,7 @@ Extinction: TypeAlias = Annotated[
 
 ImageSide: TypeAlias = Annotated[int, Field(ge=1, le=MAX_IMAGE_SIDE)]
 MapSize: TypeAlias = Annotated[int, Field(ge=1, le=MAX_MAP_SIZE), AfterValidator(_power_of_two)]
+LightmapSize: TypeAlias = Annotated[int, Field(ge=0, le=MAX_MAP_SIZE), AfterValidator(_power_of_two)]
 
 
 def one_of(*names: str) -> AfterValidator:

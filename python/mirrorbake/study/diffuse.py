@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mirrorbake.bake.body_light import RAYS, Lightmap, irradiance_of, lit_sides, own_coordinates
+from mirrorbake.bake.body_light import RAYS, Lightmap, has_own_coordinates, irradiance_of, lit_sides
 from mirrorbake.bake.light_storage import BYTES, SIZES
 from mirrorbake.bake.traced_light import TracedLight
 from mirrorbake.errors import InputError, one_line_errors
@@ -69,7 +69,7 @@ def ways_to_store(config: SceneConfig) -> Iterator[Storage]:
         name = f"vertices, edges up to {1e3 * edge / 2**halvings:.3g} mm"
         change = TracedLight(finer).change_by(irradiance_of(finer, sides))
         yield Storage(name, sides * len(finer.built.positions), change)
-    if own_coordinates(stage) is not None:
+    if has_own_coordinates(stage):
         for size in SIZES:
             lightmap = Lightmap(stage, size)
             texels = lightmap.inferred(lightmap.gathered(sides, RAYS, config.trace.seed))

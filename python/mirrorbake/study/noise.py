@@ -197,6 +197,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     if options.bias and (options.object or options.sky):
         parser.error("--bias is measured of the teapot in its room, without --object and --sky")
+    if options.cache_seed and not options.bias:
+        parser.error(f"--cache-seed {options.cache_seed}: is measured with --bias alone")
     if options.pictures < 2:
         parser.error(f"--pictures {options.pictures}: expected 2 or more")
     if not 0 <= options.cache_seed < 2**64:

@@ -5,6 +5,8 @@
 #include <initializer_list>
 #include <limits>
 #include <map>
+#include <queue>
+#include <tuple>
 #include <utility>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -12,6 +14,7 @@
 #include "gather.hpp"
 #include "mirrorbake/core/interrupt.hpp"
 #include "sample_stream.hpp"
+#include "triangle_sampler.hpp"
 #include "world.hpp"
 
 namespace mirrorbake::tracing {
@@ -21,19 +24,22 @@ namespace {
 constexpr float kSameFace = 0.999F;
 // A cell's longest edge is at most this part of its distance to the object in focus, with kReach of the
 // diagonal of its box added: what a mirror shows of its surroundings is that much finer close by.
-constexpr float kFineness = 0.1F;
-constexpr float kReach = 0.06F;
+constexpr float kFineness = 0.07F;
+constexpr float kReach = 0.12F;
 // Along the longest side of its box: in so many steps it is known where the object is.
 constexpr int kBlocks = 16;
-// Quarters of quarters of a triangle, at most: a ground of two triangles a thousand times the object's size.
-constexpr int kMostCuts = 14;
-constexpr std::size_t kMostCells = std::size_t{1} << 17;
+// What the object cannot see ends at cells as many times as wide.
+constexpr float kWidthIfHidden = 3.0F;
+// Halves of halves of a triangle, at most: a ground of two triangles a thousand times the object's size.
+constexpr int kMostCuts = 28;
+constexpr std::size_t kMostCells = std::size_t{1} << 18;
 // Where light may change at a step cells are as fine as this,
 constexpr float kFinenessOfSteps = 0.05F;
-// which is where what a corner sees is as many times closer than what another one sees, by so many rays.
+// which is where what a corner sees is as many times closer than what another one sees. By so many rays it
+// is known what is close to a corner and whether a cell is hidden.
 constexpr float kStep = 3.0F;
 constexpr std::uint32_t kLooks = 16;
-constexpr std::size_t kMostCellsOfSteps = std::size_t{1} << 16;
+constexpr std::size_t kMostCellsOfSteps = std::size_t{1} << 17;
 constexpr float kUnknown = -1.0F;
 
 struct Box {
@@ -50,6 +56,10 @@ struct Box {
     return glm::length(glm::max(glm::max(other.min - max, min - other.max), glm::vec3(0.0F)));
   }
 };
+
+float longest_edge(const std::array<glm::vec3, 3>& p) {
+  return std::max({glm::distance(p[0], p[1]), glm::distance(p[1], p[2]), glm::distance(p[2], p[0])});
+}
 
 }  // namespace
 
@@ -72,11 +82,17 @@ class CacheCells::Refiner {
       blocks[{block.x, block.y, block.z}].add({box.min, box.max});
     }
     for (const auto& [place, box] : blocks) focus_blocks_.push_back(box);
+    std::vector<TriangleSampler::Triangle> all;
+    std::vector<double> areas;
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      all.push_back({focus_, t});
+      areas.push_back(triangle_area(p, triangles[t]));
+    }
+    points_of_focus_ = TriangleSampler(std::move(all), areas);
   }
 
   void cut_triangles() {
-    cut_while([&](const Task& task, const Cell& cell) { return is_wider(task, cell, kFineness); },
-              kMostCells);
+    cut_while([&](const Task& task, const Cell& cell) { return too_wide(task, cell); }, kMostCells);
     cut_while([&](const Task& task, const Cell& cell) { return has_step(task, cell); },
               kMostCells + kMostCellsOfSteps);
   }
@@ -86,27 +102,39 @@ class CacheCells::Refiner {
     std::uint32_t object;
     std::uint32_t triangle;
     std::uint32_t cell;  ///< kNone: the whole triangle
+    int cuts = 0;        ///< that have made it in this round
+    float excess = 0.0F;
+
+    /// The widest are cut first, so that where the number of cells ends the cutting, it ends alike
+    /// everywhere.
+    bool operator<(const Task& other) const {
+      return excess != other.excess
+                 ? excess < other.excess
+                 : std::tie(object, triangle, cell) > std::tie(other.object, other.triangle, other.cell);
+    }
   };
 
-  template <typename IsCoarse>
-  void cut_while(const IsCoarse& is_coarse, std::size_t most_cells) {
-    std::vector<Task> tasks;
+  /// `excess`: of a cell, how many times it is wider than it should be; it is cut where that is more than 1.
+  template <typename Excess>
+  void cut_while(const Excess& excess, std::size_t most_cells) {
+    std::vector<Task> first;
     cells_.visit_cells([&](std::uint32_t object, std::uint32_t triangle, std::uint32_t cell, glm::uvec3) {
-      const Task task{object, triangle, cell};
-      if (object != focus_ && is_coarse(task, cell_of(task))) tasks.push_back(task);
+      Task task{object, triangle, cell};
+      if (object == focus_) return;
+      task.excess = excess(task, cell_of(task));
+      if (task.excess > 1.0F) first.push_back(task);
     });
-    // Breadth first, so that where the number of cells ends the cutting, it ends everywhere alike.
-    for (int cuts = 0; cuts < kMostCuts && !tasks.empty(); ++cuts) {
-      std::vector<Task> next;
-      for (const Task& task : tasks) {
-        if (cells_.cells_.size() + 5 > most_cells) return;
-        const std::uint32_t first = cut(task);
-        for (std::uint32_t part = first; part < first + 4; ++part) {
-          const Task of_part{task.object, task.triangle, part};
-          if (is_coarse(of_part, cells_.cells_[part])) next.push_back(of_part);
-        }
+    std::priority_queue<Task> tasks(std::less<Task>(), std::move(first));
+    while (!tasks.empty() && cells_.cells_.size() + 3 <= most_cells) {
+      const Task task = tasks.top();
+      tasks.pop();
+      const std::uint32_t first_part = cut(task);
+      if (task.cuts + 1 == kMostCuts) continue;
+      for (std::uint32_t part = first_part; part < first_part + 2; ++part) {
+        Task of_part{task.object, task.triangle, part, task.cuts + 1};
+        of_part.excess = excess(of_part, cells_.cells_[part]);
+        if (of_part.excess > 1.0F) tasks.push(of_part);
       }
-      tasks = std::move(next);
     }
   }
 
@@ -123,29 +151,63 @@ class CacheCells::Refiner {
             tracing::interpolate(p, t, cell.weights[2])};
   }
 
-  static float longest_edge(const std::array<glm::vec3, 3>& p) {
-    return std::max({glm::distance(p[0], p[1]), glm::distance(p[1], p[2]), glm::distance(p[2], p[0])});
-  }
-
-  /// Whether its longest edge is more than `fineness` of its distance to the object in focus.
-  bool is_wider(const Task& task, const Cell& cell, float fineness) const {
-    const std::array<glm::vec3, 3> p = corners_of(task, cell);
+  /// Its longest edge as a multiple of what it may be, `fineness` of the distance to the object in focus.
+  float width(const std::array<glm::vec3, 3>& corners, float fineness) const {
     Box box;
-    box.add({p[0], p[1], p[2]});
-    const float near = longest_edge(p) / fineness - reach_;
-    return box.distance(focus_box_) < near &&
-           std::any_of(focus_blocks_.begin(), focus_blocks_.end(),
-                       [&](const Box& block) { return box.distance(block) < near; });
+    box.add({corners[0], corners[1], corners[2]});
+    const float edge = longest_edge(corners);
+    if (edge <= fineness * (box.distance(focus_box_) + reach_)) return 0.0F;
+    float distance = std::numeric_limits<float>::infinity();
+    for (const Box& block : focus_blocks_) distance = std::min(distance, box.distance(block));
+    return edge / (fineness * (distance + reach_));
   }
 
-  /// Whether light may change at a step within it: something close covers one of its corners and leaves
-  /// another one open.
-  bool has_step(const Task& task, const Cell& cell) {
-    if (!is_wider(task, cell, kFinenessOfSteps)) return false;
+  float too_wide(const Task& task, const Cell& cell) {
+    const std::array<glm::vec3, 3> corners = corners_of(task, cell);
+    const float width_now = width(corners, kFineness);
+    return width_now > 1.0F && width_now < kWidthIfHidden && is_hidden(task, cell) ? 0.0F : width_now;
+  }
+
+  /// Whether rays from random points of a cell to random points of the object in focus find none of them.
+  bool is_hidden(const Task& task, const Cell& cell) const {
+    if (!(points_of_focus_.weight() > 0.0)) return false;
+    poll_interrupt();
+    const std::uint64_t key =
+        hash64(hash64(task.object, task.triangle), hash64(cell.nodes.x, hash64(cell.nodes.y, cell.nodes.z)));
+    constexpr float kUpTo = 0.999F;
+    const glm::vec3 normal = face_normal(world_, task.object, task.triangle);
+    if (normal == glm::vec3(0.0F)) return true;
+    for (std::uint32_t r = 0; r < kLooks; ++r) {
+      const SampleStream stream{key, r};
+      const glm::vec2 u = uniform_on_triangle(stream.get(diffuse_dimension));
+      const glm::vec2 weights =
+          (1.0F - u.x - u.y) * cell.weights[0] + u.x * cell.weights[1] + u.y * cell.weights[2];
+      const glm::vec3 to = world_.position(points_of_focus_.sample(stream.get(light_dimension)));
+      const Surface front = surface_of_triangle(world_, task.object, task.triangle, weights, normal);
+      const glm::vec3 way = to - front.position;
+      const Surface start = glm::dot(way, normal) > 0.0F
+                                ? front
+                                : surface_of_triangle(world_, task.object, task.triangle, weights, -normal);
+      const float distance = glm::length(way);
+      if (!(distance > 0.0F)) return false;
+      const glm::vec3 direction = way / distance;
+      const Hit hit =
+          world_.rays.all().intersect({offset_origin(start, direction), direction}, RayKind::reflection);
+      if (hit.missed() || hit.geometry == focus_ || hit.distance > kUpTo * distance) return false;
+    }
+    return true;
+  }
+
+  /// How many times wider than it may be a cell is where light may change at a step within it, else 0:
+  /// something close covers one of its corners and leaves another one open.
+  float has_step(const Task& task, const Cell& cell) {
+    const std::array<glm::vec3, 3> corners = corners_of(task, cell);
+    const float width_now = width(corners, kFinenessOfSteps);
+    if (!(width_now > 1.0F)) return 0.0F;
     std::array<float, 3> closeness;
     for (int k = 0; k < 3; ++k) closeness[k] = closeness_at(task, cell, k);
     const auto [least, most] = std::minmax_element(closeness.begin(), closeness.end());
-    return *most > kStep * *least && *most * longest_edge(corners_of(task, cell)) > 0.5F;
+    return *most > kStep * *least && *most * longest_edge(corners) > 0.5F ? width_now : 0.0F;
   }
 
   /// Mean of the inverse distances to what a node sees on its front, whose own inverse is Ward's measure of
@@ -175,7 +237,7 @@ class CacheCells::Refiner {
     return closeness_[node] = sum / static_cast<float>(kLooks);
   }
 
-  /// Returns the first of its four parts.
+  /// Halves its longest edge. Returns the first of its two parts.
   std::uint32_t cut(const Task& task) {
     const Cell whole = cell_of(task);
     std::uint32_t number = task.cell;
@@ -186,30 +248,30 @@ class CacheCells::Refiner {
       root[task.triangle] = number;
       cells_.cells_.push_back(whole);
     }
+    const std::array<glm::vec3, 3> p = corners_of(task, whole);
+    int apex = 0;
+    float longest = 0.0F;
+    for (int k = 0; k < 3; ++k) {
+      const float edge = glm::distance(p[(k + 1) % 3], p[(k + 2) % 3]);
+      if (edge > longest) {
+        longest = edge;
+        apex = k;
+      }
+    }
+    const int a = (apex + 1) % 3;
+    const int b = (apex + 2) % 3;
     const auto first = static_cast<std::uint32_t>(cells_.cells_.size());
     cells_.cells_[number].first_part = first;
-    // Opposite to each corner.
-    std::uint32_t node[3];
-    glm::vec2 weights[3];
-    for (int k = 0; k < 3; ++k) {
-      const int a = (k + 1) % 3;
-      const int b = (k + 2) % 3;
-      node[k] = middle(whole.nodes[a], whole.nodes[b]);
-      weights[k] = 0.5F * (whole.weights[a] + whole.weights[b]);
-    }
-    for (int k = 0; k < 3; ++k) {
-      const int a = (k + 1) % 3;
-      const int b = (k + 2) % 3;
-      Cell part;
-      part.nodes[k] = whole.nodes[k];
-      part.weights[k] = whole.weights[k];
-      part.nodes[a] = node[b];
-      part.weights[a] = weights[b];
-      part.nodes[b] = node[a];
-      part.weights[b] = weights[a];
+    cells_.cells_[number].apex = static_cast<std::uint8_t>(apex);
+    const std::uint32_t node = middle(whole.nodes[a], whole.nodes[b]);
+    const glm::vec2 weights = 0.5F * (whole.weights[a] + whole.weights[b]);
+    for (const int replaced : {b, a}) {
+      Cell part = whole;
+      part.first_part = kNone;
+      part.nodes[replaced] = node;
+      part.weights[replaced] = weights;
       cells_.cells_.push_back(part);
     }
-    cells_.cells_.push_back({{node[0], node[1], node[2]}, {weights[0], weights[1], weights[2]}, kNone});
     return first;
   }
 
@@ -225,6 +287,7 @@ class CacheCells::Refiner {
   CacheCells& cells_;
   Box focus_box_;
   std::vector<Box> focus_blocks_;
+  TriangleSampler points_of_focus_;
   float reach_ = 0.0F;
   std::vector<float> closeness_;  ///< of each node, 1/m, or kUnknown
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles_;
@@ -302,7 +365,7 @@ void CacheCells::visit_cells(Visit visit) const {
         if (first == kNone) {
           visit(o, t, cell, cells_[cell].nodes);
         } else {
-          open.insert(open.end(), {first, first + 1, first + 2, first + 3});
+          open.insert(open.end(), {first, first + 1});
         }
       }
     }
@@ -311,8 +374,11 @@ void CacheCells::visit_cells(Visit visit) const {
 
 void CacheCells::list_corners() {
   first_corner_.assign(nodes_ + 1, 0);
+  along_curve_.reserve(nodes_);
   visit_cells([&](std::uint32_t, std::uint32_t, std::uint32_t, glm::uvec3 nodes) {
-    for (int k = 0; k < 3; ++k) ++first_corner_[nodes[k] + 1];
+    for (int k = 0; k < 3; ++k) {
+      if (first_corner_[nodes[k] + 1]++ == 0) along_curve_.push_back(nodes[k]);
+    }
   });
   for (std::size_t n = 0; n < nodes_; ++n) first_corner_[n + 1] += first_corner_[n];
   corners_.resize(first_corner_.back());
@@ -329,20 +395,24 @@ glm::vec3 CacheCells::interpolate_in_cells(const std::vector<glm::vec3>& values,
   std::uint32_t cell = root;
   glm::vec3 w(1.0F - weights.x - weights.y, weights.x, weights.y);
   while (cells_[cell].first_part != kNone) {
-    int part = 3;
-    for (int k = 0; k < 3; ++k) {
-      if (w[k] > 0.5F) part = k;
-    }
-    if (part == 3) {
-      w = 1.0F - 2.0F * w;
-    } else {
-      const float near = w[part];
-      w *= 2.0F;
-      w[part] = 2.0F * near - 1.0F;
-    }
-    cell = cells_[cell].first_part + static_cast<std::uint32_t>(part);
+    const int a = (cells_[cell].apex + 1) % 3;
+    const int b = (cells_[cell].apex + 2) % 3;
+    const bool second = w[b] > w[a];
+    const int kept = second ? b : a;
+    const int replaced = second ? a : b;
+    w[kept] -= w[replaced];
+    w[replaced] *= 2.0F;
+    cell = cells_[cell].first_part + (second ? 1U : 0U);
   }
   return tracing::interpolate(values, cells_[cell].nodes, {w.y, w.z});
+}
+
+glm::vec3 CacheCells::position(const World& world, std::size_t node) const {
+  const Corner& corner = corners(node).front();
+  const auto k = static_cast<int>(corner.corner);
+  const std::span<const glm::vec3> p = world.rays.positions(static_cast<int>(corner.object));
+  const glm::uvec3 t = world.scene.objects[corner.object].mesh.triangles[corner.triangle];
+  return corner.cell == kNone ? p[t[k]] : tracing::interpolate(p, t, cells_[corner.cell].weights[k]);
 }
 
 Surface CacheCells::surface_near(const World& world, const Corner& corner, glm::vec2 u,

@@ -15,8 +15,8 @@ namespace mirrorbake::tracing {
 struct World;
 
 /// Cells of all diffuse surfaces, between whose corners the irradiance cache interpolates: triangles, and
-/// near the object in focus quarters of triangles, again and again. The corners of cells are the cache's
-/// nodes: one per vertex, or per face that meets there where faces are flat.
+/// near the object in focus halves of triangles, again and again. The corners of cells are the cache's nodes:
+/// one per vertex, or per face that meets there where faces are flat.
 class CacheCells {
  public:
   /// One of the cells that meet at a node.
@@ -33,6 +33,9 @@ class CacheCells {
   CacheCells(const World& world, int focus);
 
   std::size_t node_count() const { return first_corner_.empty() ? 0 : first_corner_.size() - 1; }
+  /// All nodes, in an order that goes from one to a close one nearly everywhere: along the curve that halving
+  /// triangles draws on them.
+  const std::vector<std::uint32_t>& along_curve() const { return along_curve_; }
   /// Of an object, those at its vertices.
   std::size_t vertex_nodes(std::uint32_t object) const { return vertex_nodes_[object]; }
   bool is_vertex(std::size_t node) const { return node < first_cut_; }
@@ -42,6 +45,8 @@ class CacheCells {
   glm::uvec3 nodes(const Corner& corner) const {
     return corner.cell == kNone ? triangle_nodes(corner.object, corner.triangle) : cells_[corner.cell].nodes;
   }
+
+  glm::vec3 position(const World& world, std::size_t node) const;
 
   /// Of `values` per node; 0 on objects without diffuse reflection.
   glm::vec3 interpolate(const std::vector<glm::vec3>& values, const Surface& surface) const {
@@ -59,11 +64,12 @@ class CacheCells {
   Surface surface_near(const World& world, const Corner& corner, glm::vec2 u, glm::vec3 towards) const;
 
  private:
-  /// A triangle in focus, or a quarter of such a one.
+  /// A triangle that is cut, or a part of one.
   struct Cell {
     glm::uvec3 nodes{0};
     glm::vec2 weights[3];              ///< of the triangle's second and third vertex, at the corners
-    std::uint32_t first_part = kNone;  ///< of four; the last one is the middle
+    std::uint32_t first_part = kNone;  ///< of two: that with the corner after `apex`
+    std::uint8_t apex = 0;             ///< the corner that the cut goes through
   };
   class Refiner;
 
@@ -88,6 +94,7 @@ class CacheCells {
   /// The cell of each triangle, kNone for most, per object; empty for objects of which no triangle is cut.
   std::vector<std::vector<std::uint32_t>> root_;
   std::vector<Cell> cells_;
+  std::vector<std::uint32_t> along_curve_;
   /// Corners of each node: corners_[first_corner_[node]] … corners_[first_corner_[node + 1]].
   std::vector<std::uint32_t> first_corner_;
   std::vector<Corner> corners_;

@@ -19,7 +19,7 @@
 namespace mirrorbake::tracing {
 namespace {
 
-constexpr std::size_t kPhotons = 1U << 17;
+constexpr std::size_t kPhotons = 1U << 18;
 
 // Cells along the grid's longest side.
 constexpr int kCells = 32;
@@ -27,8 +27,8 @@ constexpr int kCells = 32;
 constexpr float kMostRays = 0.7F;
 // Where caustics are this part of the light that falls on the reflectors, there are half as many.
 constexpr float kNoticeable = 0.01F;
-// Fewer than this are not worth the look.
-constexpr float kFewestRays = 0.1F;
+// Fewer than this are nothing that the cache should know of.
+constexpr float kFewestRays = 0.002F;
 
 // The octahedral map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors",
 // JCGT 3(2), 2014) to [−1,1]², and its solid angle per area, |d|₁³ for a unit direction d.

@@ -342,7 +342,7 @@ glm::vec3 diffuse_path_radiance(const LitWorld& lit, const Surface& start, const
   int chain = 0;
   float chain_weight = 1.0F;
   const auto leave_diffuse = [&](const VertexNumbers& numbers) {
-    cell = lit.indirect.guide.cell(surface.position);
+    cell = lit.indirect.guide.cell_of_path(surface.position);
     if (cell.rays > 0.0F) {
       cell.rays *= std::min(1.0F, brightest(throughput));
       sum += throughput * guided_light(lit, surface, cell, limits, specular_bounces, numbers);

@@ -19,14 +19,14 @@ namespace {
 
 // Rays after which a hemisphere inside a closed body is given up.
 constexpr int kProbeRays = 16;
-// Later passes gather light that is dimmer and smoother than the first one's: a quarter of the rays will do.
-constexpr int kLaterShare = 4;
+// Later passes gather light that is dimmer and smoother than the first one's: a sixth of the rays will do.
+constexpr int kLaterShare = 6;
 // Caustics are as sharp as the mirrors: they take as many times the rays of the first pass, by the root of
 // their strength, as their noise is in proportion to that.
 constexpr float kRaysPerRootOfCaustics = 20.0F;
 constexpr int kMostCausticShare = 16;
 // Bright surfaces are few and small: as many times fewer rays than the first pass.
-constexpr int kBrightShare = 4;
+constexpr int kBrightShare = 6;
 // Nodes of an object's vertices up to which each takes all of its rays; beyond it they have as many as these
 // have, down to a share that the mean with a node and its ring of six makes up for.
 constexpr float kNodesWithAllRays = 16384.0F;
@@ -52,10 +52,12 @@ IrradianceCache::IrradianceCache(const World& world, const CausticGuide& guide, 
   gather(world, guide, options);
 }
 
-IrradianceCache::NodeRays IrradianceCache::node_rays(const World& world, std::size_t node, int side,
-                                                     int most) const {
+IrradianceCache::NodeRays IrradianceCache::node_rays(const World& world, std::size_t place, int side,
+                                                     int pass, int most) const {
+  const std::uint32_t node = cells_.along_curve()[place];
   NodeRays rays;
-  rays.key = hash64(seed_, 2 * node + static_cast<std::size_t>(side));
+  rays.key = hash64(seed_, static_cast<std::uint64_t>(2 * pass + side));
+  rays.place = static_cast<std::uint32_t>(place);
   rays.is_back = side == 1;
   // A node with a share of the rays is given up as early in them as others are.
   rays.probing = rays_of(node, kProbeRays, kLeastRays);
@@ -64,7 +66,7 @@ IrradianceCache::NodeRays IrradianceCache::node_rays(const World& world, std::si
   for (std::size_t i = 0; i < count; ++i) {
     const CacheCells::Corner& corner = corners[i % corners.size()];
     const glm::vec3 n = face_normal(world, corner.object, corner.triangle);
-    const glm::vec2 u = rays.stream(static_cast<int>(i)).get(dimension_base(0, 1));
+    const glm::vec2 u = rays.stream(static_cast<int>(i), kStartPoints).get(dimension_base(0, 1));
     rays.starts[i] = cells_.surface_near(world, corner, u, rays.is_back ? -n : n);
   }
   return rays;
@@ -72,16 +74,13 @@ IrradianceCache::NodeRays IrradianceCache::node_rays(const World& world, std::si
 
 glm::vec3 IrradianceCache::node_caustics(const World& world, const CausticGuide& guide,
                                          const NodeRays& rays) {
-  if (guide.knows_nothing()) return glm::vec3(0.0F);
-  const float strength = CausticGuide::strength(guide.cell(rays.starts[0].position));
-  const float share =
-      std::clamp(kRaysPerRootOfCaustics * std::sqrt(strength), 1.0F, static_cast<float>(kMostCausticShare));
-  const auto count = static_cast<int>(share * static_cast<float>(rays.along_cosine));
+  if (rays.to_caustics == 0) return glm::vec3(0.0F);
   glm::vec3 sum(0.0F);
-  for (int r = 0; r < count; ++r) {
-    sum += caustic_irradiance(world, guide, rays.start(r, count), rays.stream(r));
+  for (int r = 0; r < rays.to_caustics; ++r) {
+    const SampleStream stream{rays.key, rays.first_to_caustics + static_cast<std::uint32_t>(r)};
+    sum += caustic_irradiance(world, guide, rays.start(r, rays.to_caustics), stream);
   }
-  return sum / static_cast<float>(count);
+  return sum / static_cast<float>(rays.to_caustics);
 }
 
 // How many of a node's rays go towards a hit, per solid angle.
@@ -99,7 +98,7 @@ glm::vec3 IrradianceCache::from_bright(const World& world, const BrightSurfaces&
                                        const NodeRays& rays) {
   glm::vec3 sum(0.0F);
   for (int r = 0; r < rays.to_bright; ++r) {
-    const SampleStream stream = rays.stream(r);
+    const SampleStream stream = rays.stream(r, rays.to_bright);
     const Surface& start = rays.start(r, rays.to_bright);
     const Hit wanted = bright.sample(stream.get(dimension_base(0, 1) + guide_dimension));
     const glm::vec3 direction = glm::normalize(world.position(wanted) - start.position);
@@ -131,7 +130,7 @@ IrradianceCache::NodeGather IrradianceCache::gather_node(const World& world, con
       result.given_up = true;
       break;
     }
-    const SampleStream stream = rays.stream(r);
+    const SampleStream stream = rays.stream(r, rays.along_cosine);
     const Surface& start = rays.start(r, rays.along_cosine);
     const glm::vec3 direction =
         sample_cosine_hemisphere(Frame(start.normal), stream.get(dimension_base(0, 0) + diffuse_dimension));
@@ -165,6 +164,7 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
     given_up[side].assign(nodes, 0);
   }
 
+  const std::vector<std::uint32_t> first_to_caustics = rays_to_caustics(world, guide, options.cache_rays);
   Sides previous;
   for (int pass = 0; pass < options.cache_bounces; ++pass) {
     const auto direct = [&](const Surface& s, glm::vec2 u) {
@@ -180,17 +180,20 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
     for (int side = 0; side < 2; ++side) {
       found.side[side].assign(nodes, glm::vec3(0.0F));
       parallel_for(nodes, 32, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t node = begin; node < end; ++node) {
+        for (std::size_t place = begin; place < end; ++place) {
+          const std::uint32_t node = cells_.along_curve()[place];
           if (given_up[side][node] != 0) continue;
           poll_interrupt();
           const int own = rays_of(node, rays, pass == 0 ? kLeastRays : kLeastLaterRays);
-          NodeRays of_node = node_rays(world, node, side, pass == 0 ? kMostCausticShare * own : own);
+          NodeRays of_node = node_rays(world, place, side, pass, pass == 0 ? kMostCausticShare * own : own);
           of_node.along_cosine = own;
           if (pass > 0) {
             found.side[side][node] = gather_node(world, bright, of_node, indirect).irradiance;
             continue;
           }
           if (!bright.empty()) of_node.to_bright = std::max(own / kBrightShare, 1);
+          of_node.first_to_caustics = first_to_caustics[place];
+          of_node.to_caustics = static_cast<int>(first_to_caustics[place + 1] - first_to_caustics[place]);
           const NodeGather gathered = gather_node(world, bright, of_node, direct);
           found.side[side][node] = gathered.irradiance;
           // The bounce of what these find is gathered by the next pass.
@@ -204,11 +207,27 @@ void IrradianceCache::gather(const World& world, const CausticGuide& guide, cons
       });
       share_rays(found.side[side], buried[side]);
       fill_buried(found.side[side], buried[side]);
+      sharpen(world, found.side[side], buried[side]);
       for (std::size_t i = 0; i < nodes; ++i) total_.side[side][i] += found.side[side][i];
     }
     if (pass > 0 && pass + 1 == options.cache_bounces) add_further_bounces(previous, found);
     previous = std::move(found);
   }
+}
+
+std::vector<std::uint32_t> IrradianceCache::rays_to_caustics(const World& world, const CausticGuide& guide,
+                                                             int rays) const {
+  std::vector<std::uint32_t> first(cells_.node_count() + 1, 0);
+  if (guide.knows_nothing()) return first;
+  for (std::size_t place = 0; place < cells_.node_count(); ++place) {
+    const std::uint32_t node = cells_.along_curve()[place];
+    const float strength = CausticGuide::strength(guide.cell(cells_.position(world, node)));
+    const float share =
+        std::clamp(kRaysPerRootOfCaustics * std::sqrt(strength), 1.0F, static_cast<float>(kMostCausticShare));
+    const auto own = static_cast<float>(rays_of(node, rays, kLeastRays));
+    first[place + 1] = first[place] + static_cast<std::uint32_t>(share * own);
+  }
+  return first;
 }
 
 void IrradianceCache::add_further_bounces(const Sides& before, const Sides& last) {
@@ -259,6 +278,40 @@ void IrradianceCache::share_rays(std::vector<glm::vec3>& values,
         }
       }
       values[node] = sum / static_cast<float>(count);
+    }
+  });
+}
+
+void IrradianceCache::sharpen(const World& world, std::vector<glm::vec3>& values,
+                              const std::vector<std::uint8_t>& buried) const {
+  // On congruent triangles whose edges have the mean square m, light of Laplacian c is c m / 16 less in the
+  // mean over a cell than what is interpolated, and the mean of a node's neighbours is c m / 4 above it.
+  constexpr float kPart = 0.25F;
+  // Of neighbours that lie to one side, as on a border, the mean tells of the light's slope instead.
+  constexpr float kLeastSymmetry = 0.9F;
+  const std::vector<glm::vec3> gathered = values;
+  parallel_for(values.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t node = begin; node < end; ++node) {
+      if (buried[node] != 0 || ray_share(node) < 1.0F) continue;
+      const glm::vec3 here = cells_.position(world, node);
+      glm::vec3 sum(0.0F);
+      glm::vec3 steps(0.0F);
+      float length = 0.0F;
+      int count = 0;
+      for (const CacheCells::Corner& corner : cells_.corners(node)) {
+        const glm::uvec3 around = cells_.nodes(corner);
+        for (int k = 0; k < 3; ++k) {
+          if (around[k] == node || buried[around[k]] != 0) continue;
+          const glm::vec3 step = cells_.position(world, around[k]) - here;
+          steps += step;
+          length += glm::length(step);
+          sum += gathered[around[k]];
+          ++count;
+        }
+      }
+      if (count == 0 || glm::length(steps) > (1.0F - kLeastSymmetry) * length) continue;
+      const glm::vec3 bend = sum / static_cast<float>(count) - gathered[node];
+      values[node] = glm::max(gathered[node] - kPart * bend, glm::vec3(0.0F));
     }
   });
 }

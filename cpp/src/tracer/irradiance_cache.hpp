@@ -61,16 +61,25 @@ class IrradianceCache {
     bool buried = false;    ///< most rays hit the dark inside of a body
     bool given_up = false;  ///< the first rays found that, or, on a back side, nothing at all
   };
-  /// The rays of one side of a node.
+  /// The rays of one side of a node in one pass.
   struct NodeRays {
-    std::uint64_t key = 0;                     ///< of their random numbers
+    std::uint64_t key = 0;                     ///< of their random numbers, as of all nodes'
+    std::uint32_t place = 0;                   ///< of the node, along the curve through all of them
     std::array<Surface, kStartPoints> starts;  ///< random points around it
     bool is_back = false;
     int along_cosine = 0;
-    int probing = 0;    ///< of those, after which a hemisphere may be given up
-    int to_bright = 0;  ///< beside those; 0: those find what bright surfaces reflect
+    int probing = 0;                      ///< of those, after which a hemisphere may be given up
+    int to_bright = 0;                    ///< beside those; 0: those find what bright surfaces reflect
+    int to_caustics = 0;                  ///< beside those
+    std::uint32_t first_to_caustics = 0;  ///< number of the first among those of all nodes
 
-    SampleStream stream(int ray) const { return {key, static_cast<std::uint32_t>(ray)}; }
+    /// The numbers of a ray of `count`. Nodes take theirs in turn from one sequence, so that any that are
+    /// close to each other together have stratified rays, and their errors cancel where they are seen as one
+    /// (as between pixels: Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error
+    /// via Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020).
+    SampleStream stream(int ray, int count) const {
+      return {key, place * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(ray)};
+    }
     /// Where a ray of `count` starts.
     const Surface& start(int ray, int count) const {
       return starts[static_cast<std::uint32_t>(ray) %
@@ -78,7 +87,7 @@ class IrradianceCache {
     }
   };
   /// With starts for at most `most` rays of a kind.
-  NodeRays node_rays(const World& world, std::size_t node, int side, int most) const;
+  NodeRays node_rays(const World& world, std::size_t place, int side, int pass, int most) const;
   template <typename IrradianceAt>
   static NodeGather gather_node(const World& world, const BrightSurfaces& bright, const NodeRays& rays,
                                 const IrradianceAt& irradiance_at);
@@ -91,7 +100,13 @@ class IrradianceCache {
   void gather(const World& world, const CausticGuide& guide, const TracerOptions& options);
   /// Those after the last one that is followed: each keeps of the one before what the last one kept.
   void add_further_bounces(const Sides& before, const Sides& last);
+  /// Of all nodes along the curve, the number of the first ray to caustics, and one entry more for their end.
+  std::vector<std::uint32_t> rays_to_caustics(const World& world, const CausticGuide& guide, int rays) const;
   void fill_buried(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
+  /// Turns the light at nodes into values of which the interpolation has the right mean over cells. Between
+  /// the light at its corners a cell would be too dark on a hill of light, and too bright in a valley.
+  void sharpen(const World& world, std::vector<glm::vec3>& values,
+               const std::vector<std::uint8_t>& buried) const;
   /// Takes means with the neighbours, buried ones left out, where nodes have a share of the rays.
   void share_rays(std::vector<glm::vec3>& values, const std::vector<std::uint8_t>& buried) const;
   /// Of the rays that nodes have elsewhere, in (0,1].

@@ -262,7 +262,7 @@ class Trace(Section):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     indirect: Literal["none", "cached", "path"] = "cached"
     """Diffuse light from other diffuse surfaces."""
-    cache_rays: Annotated[int, Field(ge=1, le=65536)] = 64
+    cache_rays: Annotated[int, Field(ge=1, le=65536)] = 96
     """Rays per vertex and bounce with which `cached` indirect light is gathered."""
 
 

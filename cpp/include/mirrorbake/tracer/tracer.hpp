@@ -36,14 +36,14 @@ struct EnumNames<IndirectLight> {
 
 struct TracerOptions {
   IndirectLight indirect = IndirectLight::cached;
-  /// Gather rays per vertex of the `cached` indirect light, 1…65536; a quarter of them after the first
+  /// Gather rays per vertex of the `cached` indirect light, 1…65536; a sixth of them after the first
   /// bounce, one to sixteen times as many for caustics, the brighter the more. Of an object of more than
   /// 16384 vertices each takes a share, down to a fifth, and shares its neighbours'.
-  int cache_rays = 64;
+  int cache_rays = 96;
   int cache_bounces = 6;   ///< diffuse bounces that `cached` follows, 1…16
   std::uint64_t seed = 0;  ///< of the cache
   /// Object that mirrors what is close to it: around it the cache has more points than the vertices of other
-  /// objects, a tenth of their distance from it apart. Less than 0: none.
+  /// objects, a fourteenth of their distance from it apart. Less than 0: none.
   int focus = -1;
 };
 

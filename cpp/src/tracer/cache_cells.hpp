@@ -46,6 +46,16 @@ class CacheCells {
     return corner.cell == kNone ? triangle_nodes(corner.object, corner.triangle) : cells_[corner.cell].nodes;
   }
 
+  /// Calls visit(node) for the corners of all cells that meet at a node: for itself and for each neighbour once
+  /// per cell.
+  template <typename Visit>
+  void visit_around(std::size_t node, Visit visit) const {
+    for (const Corner& corner : corners(node)) {
+      const glm::uvec3 around = nodes(corner);
+      for (int k = 0; k < 3; ++k) visit(around[k]);
+    }
+  }
+
   glm::vec3 position(const World& world, std::size_t node) const;
 
   /// Of `values` per node; 0 on objects without diffuse reflection.

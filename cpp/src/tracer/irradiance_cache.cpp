@@ -269,14 +269,11 @@ void IrradianceCache::share_rays(std::vector<glm::vec3>& values,
       if (buried[node] != 0 || ray_share(node) == 1.0F) continue;
       glm::vec3 sum(0.0F);
       int count = 0;
-      for (const CacheCells::Corner& corner : cells_.corners(node)) {
-        const glm::uvec3 around = cells_.nodes(corner);
-        for (int k = 0; k < 3; ++k) {
-          if (buried[around[k]] != 0) continue;
-          sum += gathered[around[k]];
-          ++count;
-        }
-      }
+      cells_.visit_around(node, [&](std::uint32_t other) {
+        if (buried[other] != 0) return;
+        sum += gathered[other];
+        ++count;
+      });
       values[node] = sum / static_cast<float>(count);
     }
   });
@@ -298,17 +295,14 @@ void IrradianceCache::sharpen(const World& world, std::vector<glm::vec3>& values
       glm::vec3 steps(0.0F);
       float length = 0.0F;
       int count = 0;
-      for (const CacheCells::Corner& corner : cells_.corners(node)) {
-        const glm::uvec3 around = cells_.nodes(corner);
-        for (int k = 0; k < 3; ++k) {
-          if (around[k] == node || buried[around[k]] != 0) continue;
-          const glm::vec3 step = cells_.position(world, around[k]) - here;
-          steps += step;
-          length += glm::length(step);
-          sum += gathered[around[k]];
-          ++count;
-        }
-      }
+      cells_.visit_around(node, [&](std::uint32_t other) {
+        if (other == node || buried[other] != 0) return;
+        const glm::vec3 step = cells_.position(world, other) - here;
+        steps += step;
+        length += glm::length(step);
+        sum += gathered[other];
+        ++count;
+      });
       if (count == 0 || glm::length(steps) > (1.0F - kLeastSymmetry) * length) continue;
       const glm::vec3 bend = sum / static_cast<float>(count) - gathered[node];
       values[node] = glm::max(gathered[node] - kPart * bend, glm::vec3(0.0F));
@@ -327,14 +321,11 @@ void IrradianceCache::fill_buried(std::vector<glm::vec3>& values,
       if (unknown[node] == 0) continue;
       glm::vec3 sum(0.0F);
       int count = 0;
-      for (const CacheCells::Corner& corner : cells_.corners(node)) {
-        const glm::uvec3 around = cells_.nodes(corner);
-        for (int k = 0; k < 3; ++k) {
-          if (unknown[around[k]] != 0) continue;
-          sum += values[around[k]];
-          ++count;
-        }
-      }
+      cells_.visit_around(node, [&](std::uint32_t other) {
+        if (unknown[other] != 0) return;
+        sum += values[other];
+        ++count;
+      });
       if (count > 0) found.emplace_back(node, sum / static_cast<float>(count));
     }
     if (found.empty()) return;

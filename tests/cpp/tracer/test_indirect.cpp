@@ -264,6 +264,30 @@ TEST(IndirectLight, ErrorsOfCloseNodesCancel) {
   EXPECT_LT(variance(mean), of_pixels / kCells);
 }
 
+// Indirect light that cameras see, summed over them: by paths with their standard error, and by other tracers.
+struct Glow {
+  double of_paths = 0.0;
+  double error = 0.0;
+  std::vector<double> seen;
+};
+Glow glow_in(const Scene& scene, const std::vector<Camera>& cameras,
+             const std::vector<const Tracer*>& tracers) {
+  const Tracer with_paths(scene, indirect(IndirectLight::path));
+  const Tracer direct_only(scene, indirect(IndirectLight::none));
+  Glow glow;
+  glow.seen.resize(tracers.size(), 0.0);
+  for (const Camera& camera : cameras) {
+    const double direct = estimate(direct_only.trace_beauty(camera, {})).mean;
+    const Estimate path = estimate(with_paths.trace_beauty(camera, {}));
+    glow.of_paths += path.mean - direct;
+    glow.error += path.error;
+    for (std::size_t i = 0; i < tracers.size(); ++i) {
+      glow.seen[i] += estimate(tracers[i]->trace_beauty(camera, {})).mean - direct;
+    }
+  }
+  return glow;
+}
+
 // A ground of two triangles, ten times as wide as what stands on it: vertices alone know nothing of its glow.
 TEST(IndirectLight, CacheIsFinerAroundTheFocus) {
   Scene scene;
@@ -276,25 +300,13 @@ TEST(IndirectLight, CacheIsFinerAroundTheFocus) {
   const Tracer of_vertices(scene, options);
   options.focus = ball;
   const Tracer with_focus(scene, options);
-  const Tracer with_paths(scene, indirect(IndirectLight::path));
-  const Tracer direct_only(scene, indirect(IndirectLight::none));
-  double glow = 0.0;
-  double error = 0.0;
-  double seen_with_focus = 0.0;
-  double seen_of_vertices = 0.0;
-  for (const float x : {-0.2F, 0.12F, 0.16F, 0.25F}) {
-    const Camera camera = spot({x, 0, 0.01F});
-    const double direct = estimate(direct_only.trace_beauty(camera, {})).mean;
-    const Estimate path = estimate(with_paths.trace_beauty(camera, {}));
-    glow += path.mean - direct;
-    error += path.error;
-    seen_with_focus += estimate(with_focus.trace_beauty(camera, {})).mean - direct;
-    seen_of_vertices += estimate(of_vertices.trace_beauty(camera, {})).mean - direct;
-  }
-  ASSERT_GT(glow, 100.0 * error);
+  std::vector<Camera> cameras;
+  for (const float x : {-0.2F, 0.12F, 0.16F, 0.25F}) cameras.push_back(spot({x, 0, 0.01F}));
+  const Glow glow = glow_in(scene, cameras, {&of_vertices, &with_focus});
+  ASSERT_GT(glow.of_paths, 100.0 * glow.error);
+  EXPECT_LT(glow.seen[0], 0.1 * glow.of_paths);
   // For the noise of some nodes' rays, few of which meet the ball.
-  EXPECT_NEAR(seen_with_focus, glow, 0.08 * glow);
-  EXPECT_LT(seen_of_vertices, 0.1 * glow);
+  EXPECT_NEAR(glow.seen[1], glow.of_paths, 0.08 * glow.of_paths);
 }
 
 // A board that stands off a wall: nodes of the wall behind it are dark, and those of coarse cells would darken
@@ -312,22 +324,14 @@ TEST(IndirectLight, CacheIsFinerWhereLightChangesAtAStep) {
   options.cache_rays = 512;
   options.focus = ball;
   const Tracer cached(scene, options);
-  const Tracer with_paths(scene, indirect(IndirectLight::path));
-  const Tracer direct_only(scene, indirect(IndirectLight::none));
-  double glow = 0.0;
-  double error = 0.0;
-  double seen = 0.0;
+  std::vector<Camera> cameras;
   for (const float x : {-0.55F, -0.2F, 0.07F, 0.31F, 0.6F}) {
-    Camera camera = spot({x, kEdge + 0.05F, -1.5F});
-    camera.eye = {x, 1.2F, 0.4F};
-    const double direct = estimate(direct_only.trace_beauty(camera, {})).mean;
-    const Estimate path = estimate(with_paths.trace_beauty(camera, {}));
-    glow += path.mean - direct;
-    error += path.error;
-    seen += estimate(cached.trace_beauty(camera, {})).mean - direct;
+    cameras.push_back(spot({x, kEdge + 0.05F, -1.5F}));
+    cameras.back().eye = {x, 1.2F, 0.4F};
   }
-  ASSERT_GT(glow, 100.0 * error);
-  EXPECT_NEAR(seen, glow, 0.04 * glow);
+  const Glow glow = glow_in(scene, cameras, {&cached});
+  ASSERT_GT(glow.of_paths, 100.0 * glow.error);
+  EXPECT_NEAR(glow.seen[0], glow.of_paths, 0.04 * glow.of_paths);
 }
 
 TEST(IndirectLight, FocusIsAnObjectOrNone) {

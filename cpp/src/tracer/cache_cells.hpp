@@ -46,8 +46,8 @@ class CacheCells {
     return corner.cell == kNone ? triangle_nodes(corner.object, corner.triangle) : cells_[corner.cell].nodes;
   }
 
-  /// Calls visit(node) for the corners of all cells that meet at a node: for itself and for each neighbour once
-  /// per cell.
+  /// Calls visit(node) for the corners of all cells that meet at a node: for itself and for each neighbour
+  /// once per cell.
   template <typename Visit>
   void visit_around(std::size_t node, Visit visit) const {
     for (const Corner& corner : corners(node)) {

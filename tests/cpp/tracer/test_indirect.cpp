@@ -264,7 +264,8 @@ TEST(IndirectLight, ErrorsOfCloseNodesCancel) {
   EXPECT_LT(variance(mean), of_pixels / kCells);
 }
 
-// Indirect light that cameras see, summed over them: by paths with their standard error, and by other tracers.
+// Indirect light that cameras see, summed over them: by paths, with their standard error, and by other
+// tracers.
 struct Glow {
   double of_paths = 0.0;
   double error = 0.0;

@@ -92,8 +92,8 @@ class CacheCells::Refiner {
   }
 
   void cut_triangles() {
-    cut_while([&](const Task& task, const Cell& cell) { return too_wide(task, cell); }, kMostCells);
-    cut_while([&](const Task& task, const Cell& cell) { return has_step(task, cell); },
+    cut_while([&](const Task& task, const Cell& cell) { return excess_width(task, cell); }, kMostCells);
+    cut_while([&](const Task& task, const Cell& cell) { return excess_width_at_step(task, cell); },
               kMostCells + kMostCellsOfSteps);
   }
 
@@ -124,7 +124,7 @@ class CacheCells::Refiner {
       task.excess = excess(task, cell_of(task));
       if (task.excess > 1.0F) first.push_back(task);
     });
-    std::priority_queue<Task> tasks(std::less<Task>(), std::move(first));
+    std::priority_queue<Task> tasks({}, std::move(first));
     while (!tasks.empty() && cells_.cells_.size() + 3 <= most_cells) {
       const Task task = tasks.top();
       tasks.pop();
@@ -162,7 +162,8 @@ class CacheCells::Refiner {
     return edge / (fineness * (distance + reach_));
   }
 
-  float too_wide(const Task& task, const Cell& cell) {
+  /// How many times wider than it may be a cell is; 0 of one that is hidden and not much wider.
+  float excess_width(const Task& task, const Cell& cell) const {
     const std::array<glm::vec3, 3> corners = corners_of(task, cell);
     const float width_now = width(corners, kFineness);
     return width_now > 1.0F && width_now < kWidthIfHidden && is_hidden(task, cell) ? 0.0F : width_now;
@@ -177,17 +178,18 @@ class CacheCells::Refiner {
     constexpr float kUpTo = 0.999F;
     const glm::vec3 normal = face_normal(world_, task.object, task.triangle);
     if (normal == glm::vec3(0.0F)) return true;
+    const std::span<const glm::vec3> p = world_.rays.positions(static_cast<int>(task.object));
+    const glm::uvec3 t = world_.scene.objects[task.object].mesh.triangles[task.triangle];
     for (std::uint32_t r = 0; r < kLooks; ++r) {
       const SampleStream stream{key, r};
       const glm::vec2 u = uniform_on_triangle(stream.get(diffuse_dimension));
       const glm::vec2 weights =
           (1.0F - u.x - u.y) * cell.weights[0] + u.x * cell.weights[1] + u.y * cell.weights[2];
       const glm::vec3 to = world_.position(points_of_focus_.sample(stream.get(light_dimension)));
-      const Surface front = surface_of_triangle(world_, task.object, task.triangle, weights, normal);
-      const glm::vec3 way = to - front.position;
-      const Surface start = glm::dot(way, normal) > 0.0F
-                                ? front
-                                : surface_of_triangle(world_, task.object, task.triangle, weights, -normal);
+      const glm::vec3 from = tracing::interpolate(p, t, weights);
+      const glm::vec3 side = glm::dot(to - from, normal) > 0.0F ? normal : -normal;
+      const Surface start = surface_of_triangle(world_, task.object, task.triangle, weights, side);
+      const glm::vec3 way = to - start.position;
       const float distance = glm::length(way);
       if (!(distance > 0.0F)) return false;
       const glm::vec3 direction = way / distance;
@@ -198,9 +200,9 @@ class CacheCells::Refiner {
     return true;
   }
 
-  /// How many times wider than it may be a cell is where light may change at a step within it, else 0:
-  /// something close covers one of its corners and leaves another one open.
-  float has_step(const Task& task, const Cell& cell) {
+  /// The same where light may change at a step within it, else 0: something close covers one of its corners
+  /// and leaves another one open.
+  float excess_width_at_step(const Task& task, const Cell& cell) {
     const std::array<glm::vec3, 3> corners = corners_of(task, cell);
     const float width_now = width(corners, kFinenessOfSteps);
     if (!(width_now > 1.0F)) return 0.0F;

@@ -54,9 +54,9 @@ class CausticGuide {
   }
   /// The same for a vertex of a path: nothing where there is so little to find that it is not worth the look.
   Cell cell_of_path(glm::vec3 position) const {
-    constexpr float kFewestRays = 0.1F;
+    constexpr float kWorthwhile = 0.1F;
     const Cell found = cell(position);
-    return found.rays < kFewestRays ? Cell{} : found;
+    return found.rays < kWorthwhile ? Cell{} : found;
   }
 
   /// Irradiance of caustics there, as a share of that on the specular surfaces.
